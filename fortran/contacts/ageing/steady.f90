@@ -4,7 +4,7 @@
 !> fall. That is solved once, at birth, or before it for several contacts together.
 module mesoslip_contacts_ageing_steady
    use mesoslip_contacts_ageing_base, only: ageing_contacts_type, any_motion, append, falling, &
-      & in_falling, in_queue, leaders, life_birth, life_limit, life_motion, near, next_configured, &
+      & in_falling, in_queue, leaders, life_birth, life_limit, life_motion, next_configured, &
       & next_limit, next_speed, solved_together
    use mesoslip_contacts_ageing_falling, only: scan
    use mesoslip_contacts_ageing_meeting, only: meet, meet_newborn

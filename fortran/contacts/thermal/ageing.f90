@@ -1,20 +1,19 @@
 !> Contacts that break by thermal activation, whose thresholds change with their age.
 !>
-!> The rate of breaking of a contact then depends on its age, and clocks are not shared. A contact
-!> goes by the clock of a lower bound on its threshold, which gives a rate that is too high. Where
-!> it comes to its key it breaks with a probability, the ratio of its rate to that one; if it does
-!> not, it draws another deviate (P. Lewis and G. Shedler, Naval Research Logistics Quarterly 26
-!> (1979) 403). No error is made, and there is no time step. The bound of a growing threshold is its
-!> last value; that of a falling one is its value after a time, when the contact gets another
-!> bound.
+!> The rate of breaking then depends on the age of a contact, and clocks are not shared as they are.
+!> A contact has the key of a lower bound on its threshold, for which the rate is too high. Where it
+!> reaches that key, it breaks with a probability, the ratio of its rate to that of the bound;
+!> otherwise it draws another deviate (P. Lewis and G. Shedler, Naval Research Logistics Quarterly
+!> 26 (1979) 403). This is exact and has no time step. The bound of a growing threshold is its last
+!> value; that of a falling one is its value at a later time, when the bound is renewed.
 module mesoslip_contacts_thermal_ageing
-   use mesoslip_contacts_thermal_contacts, only: thermal_contacts_type, initialize_thermal, &
-      & offer_by_clocks
-   use mesoslip_contacts_thermal_keys, only: exchange_thermal, life_left, set_up_keys
    use mesoslip_contacts_ageing_law, only: ageing_law_type, take_ageing_law
    use mesoslip_contacts_base, only: contact_parameters_type, contacts_type
    use mesoslip_contacts_individual_break_tree, only: break_tree_type, new_break_tree
    use mesoslip_contacts_individual_record, only: row_limit, row_origin, row_renewal, row_stiffness
+   use mesoslip_contacts_thermal_contacts, only: thermal_contacts_type, initialize_thermal, &
+      & offer_by_clocks
+   use mesoslip_contacts_thermal_keys, only: exchange_thermal, life_left, set_up_keys
    use mesoslip_hazard, only: never
    use mesoslip_interface_law, only: interface_law_type, pose_type, window_type
    use mesoslip_numerics_archive, only: archive_type
@@ -30,52 +29,41 @@ module mesoslip_contacts_thermal_ageing
 
    !> Gap to its threshold over the mean breaking stretch at which a contact breaks
    real(wp), parameter :: tiny_gap = 1.0e-12_wp
-   !> By how much a threshold falls until it has another bound: in units of f_T, and over the gap
-   !> between it and the force
+   !> Fall of a threshold until its bound is renewed: over f_T, and over the gap to the force
    real(wp), parameter :: max_drop = 0.5_wp, max_gap_part = 0.9_wp
-   !> Number of deviates that a contact may draw in a life, which are then drawn again
+   !> Number of deviates of a life, after which they repeat
    integer(i8), parameter :: max_attempts = 65535_i8
 
-   !> Numbers of the age of a contact: when it attached [s], its configured breaking stretch [m],
-   !> when its bound changes [s], and deviates drawn in its life
+   !> Numbers of the age of a contact: time of attaching [s], configured breaking stretch [m], time
+   !> at which its bound is renewed [s], and deviates drawn in its life
    integer, parameter :: age_length = 4
    integer, parameter :: age_birth = 1, age_limit = 2, age_renewal = 3, age_attempts = 4
 
-   !> Thermally activated contacts that age. The limit in a record is a bound from below on the
-   !> breaking stretch.
+   !> Thermally activated contacts that age. The limit in a record is a lower bound on the breaking
+   !> stretch.
    type, extends(thermal_contacts_type) :: thermal_ageing_contacts_type
       !> How thresholds change
       type(ageing_law_type), private :: ageing
-      !> Numbers of their ages, shape (age_length, count)
+      !> Numbers of the ages, shape (age_length, count)
       real(wp), allocatable, private :: age(:, :)
-      !> Contacts in the order in which their bounds change
+      !> Contacts by the times at which their bounds are renewed
       type(break_tree_type), private :: order_renewal
       !> Whether contacts are those of the start
       logical, private :: is_start = .false.
    contains
-      procedure :: initialize
-      procedure :: offer
-      procedure :: plan
-      procedure :: prepare
-      procedure :: confirms
-      procedure :: renew_due
-      procedure :: rebuild
-      procedure :: records
-      procedure :: exchange
-      procedure, non_overridable, private :: bound, renew, threshold
+      procedure :: initialize, offer, plan, begin_life, accepts_break, update_bounds, rebuild, &
+         & records, exchange
+      procedure, non_overridable, private :: set_bound, renew_bound, threshold
    end type thermal_ageing_contacts_type
 
 contains
 
    !> Set up contacts from named numbers.
    subroutine make_thermal_ageing_contacts(contacts, common, parameters, error)
-      !> The contacts
       class(contacts_type), allocatable, intent(out) :: contacts
-      !> Parameters that all kinds of contacts have
       type(contact_parameters_type), intent(in) :: common
       !> The other numbers: the law of ageing, columns and rows, rate and force of activation
       type(parameters_type), intent(inout) :: parameters
-      !> Set if a number is missing or wrong, or there is not enough memory
       type(error_type), allocatable, intent(inout) :: error
 
       type(thermal_ageing_contacts_type), allocatable :: self
@@ -105,7 +93,8 @@ contains
       self%is_start = .false.
    end subroutine initialize
 
-   !> Contact force as a law, which holds until something happens, or a bound changes.
+   !> The law holds until a contact breaks or attaches, its force changes its sign, or a bound is
+   !> renewed.
    subroutine offer(self, pose, law, window)
       class(thermal_ageing_contacts_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
@@ -116,7 +105,7 @@ contains
       window%end_time = min(window%end_time, self%order_renewal%first())
    end subroutine offer
 
-   !> Write no schedule: bounds of thresholds change with the time.
+   !> There are no schedules, as bounds change with the time.
    subroutine plan(self, pose, limit, schedule)
       class(thermal_ageing_contacts_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
@@ -126,17 +115,17 @@ contains
       schedule%is_over = .true.
    end subroutine plan
 
-   subroutine prepare(self, contact, pose)
+   subroutine begin_life(self, contact, pose)
       class(thermal_ageing_contacts_type), intent(inout) :: self
       integer, intent(in) :: contact
       type(pose_type), intent(in) :: pose
 
       self%age(:, contact) = [pose%time, self%record(row_limit, contact), never, 1.0_wp]
       if (self%is_start) self%age(age_birth, contact) = -self%ageing%initial_age
-      call self%bound(contact, pose)
-   end subroutine prepare
+      call self%set_bound(contact, pose)
+   end subroutine begin_life
 
-   !> Threshold of a contact at a time, as a stretch.
+   !> Threshold of a contact at a time, as a stretch [m].
    pure function threshold(self, contact, time)
       class(thermal_ageing_contacts_type), intent(in) :: self
       integer, intent(in) :: contact
@@ -147,13 +136,13 @@ contains
          & time - self%age(age_birth, contact))
    end function threshold
 
-   !> Find a lower bound on the threshold of a contact, and until when it is one.
-   subroutine bound(self, contact, pose)
+   !> Set the lower bound on the threshold of a contact, and the time of its renewal.
+   subroutine set_bound(self, contact, pose)
       class(thermal_ageing_contacts_type), intent(inout) :: self
       integer, intent(in) :: contact
       type(pose_type), intent(in) :: pose
 
-      real(wp) :: here, gap, lack
+      real(wp) :: here, gap, deficit
 
       here = self%threshold(contact, pose%time)
       self%record(row_limit, contact) = here
@@ -165,9 +154,9 @@ contains
             gap = min(max_drop / self%hazard%slope, &
                & max_gap_part * max(gap, tiny_gap * self%stretch))
             if (here - gap > age(age_limit)) then
-               lack = self%ageing%deficit(age(age_limit), self%stretch)
+               deficit = self%ageing%deficit(age(age_limit), self%stretch)
                age(age_renewal) = max(nearest(pose%time, huge(1.0_wp)), age(age_birth) &
-                  & - self%ageing%time * log((here - gap - age(age_limit)) / (-lack)))
+                  & - self%ageing%time * log((here - gap - age(age_limit)) / (-deficit)))
                self%record(row_limit, contact) = min(here - gap, &
                   & self%threshold(contact, age(age_renewal)))
             else
@@ -176,44 +165,44 @@ contains
          end if
       end associate
       call self%order_renewal%set(contact, self%age(age_renewal, contact))
-   end subroutine bound
+   end subroutine set_bound
 
-   !> Give a contact another bound.
-   subroutine renew(self, contact, pose)
+   !> Renew the bound of a contact.
+   subroutine renew_bound(self, contact, pose)
       class(thermal_ageing_contacts_type), intent(inout) :: self
       integer, intent(in) :: contact
       type(pose_type), intent(in) :: pose
 
-      call self%settle_deviate(contact)
+      call self%update_deviate(contact)
       call self%take_out(contact)
-      call self%bound(contact, pose)
+      call self%set_bound(contact, pose)
       call self%put(contact)
-   end subroutine renew
+   end subroutine renew_bound
 
-   !> Whether a contact breaks that has come to its bound, or its clock to its key.
-   function confirms(self, contact, pose, by_clock)
+   function accepts_break(self, contact, pose, by_clock)
       class(thermal_ageing_contacts_type), intent(inout) :: self
       integer, intent(in) :: contact
       type(pose_type), intent(in) :: pose
       logical, intent(in) :: by_clock
-      logical :: confirms
+      logical :: accepts_break
 
       real(wp) :: here, uniform(2)
       integer(i8) :: attempt
 
       here = self%threshold(contact, pose%time)
-      confirms = here - abs(pose%displacement - self%record(row_origin, contact)) &
+      accepts_break = here - abs(pose%displacement - self%record(row_origin, contact)) &
          & <= tiny_gap * self%stretch
-      if (by_clock .and. .not. confirms) then
+      if (by_clock .and. .not. accepts_break) then
          attempt = int(self%age(age_attempts, contact), i8)
          call draw(attempt)
-         confirms = uniform(2) <= exp(-self%hazard%slope * (here - self%record(row_limit, contact)))
+         accepts_break = uniform(2) &
+            & <= exp(-self%hazard%slope * (here - self%record(row_limit, contact)))
       end if
-      if (confirms) then
+      if (accepts_break) then
          call self%order_renewal%remove(contact)
          return
       end if
-      call self%renew(contact, pose)
+      call self%renew_bound(contact, pose)
       if (.not. by_clock) return
       attempt = mod(attempt, max_attempts) + 1_i8
       self%age(age_attempts, contact) = real(attempt, wp)
@@ -224,8 +213,7 @@ contains
 
    contains
 
-      !> Draw the deviates of an attempt: the exponential one is of the first, and whether the
-      !> contact breaks is of the second.
+      !> Draw uniform numbers of an attempt, for its deviate and for its acceptance.
       subroutine draw(attempt)
          integer(i8), intent(in) :: attempt
 
@@ -233,10 +221,11 @@ contains
             & int(contact - 1, i8), int(self%record(row_renewal, contact), i8), attempt, uniform)
       end subroutine draw
 
-   end function confirms
+   end function accepts_break
 
-   !> Give contacts other bounds whose bounds change now; those that fell to their forces break.
-   subroutine renew_due(self, pose)
+   !> Renew the bounds that are due, and break contacts whose thresholds have fallen to their
+   !> forces.
+   subroutine update_bounds(self, pose)
       class(thermal_ageing_contacts_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
 
@@ -245,9 +234,9 @@ contains
       do
          contact = self%order_renewal%due(pose%time)
          if (contact == 0) return
-         if (self%confirms(contact, pose, .false.)) call self%break_contact(contact, pose)
+         if (self%accepts_break(contact, pose, .false.)) call self%break_contact(contact, pose)
       end do
-   end subroutine renew_due
+   end subroutine update_bounds
 
    subroutine rebuild(self, displacement)
       class(thermal_ageing_contacts_type), intent(inout) :: self

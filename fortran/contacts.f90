@@ -1,13 +1,13 @@
 !> The kinds of contacts by name.
 module mesoslip_contacts
-   use mesoslip_contacts_activated_ageing, only: make_activated_ageing
-   use mesoslip_contacts_activated_contacts, only: make_contact_activated
    use mesoslip_contacts_ageing_contacts, only: make_contact_ageing
    use mesoslip_contacts_base, only: contact_parameters_type, contacts_type, take_contact_parameters
    use mesoslip_contacts_ensemble, only: make_contact_ensemble
    use mesoslip_contacts_lattice, only: make_contact_lattice
-   use mesoslip_contacts_populations, only: make_activated_ageing_populations, &
-      & make_activated_populations, make_ageing_populations, make_contact_populations
+   use mesoslip_contacts_populations, only: make_ageing_populations, make_contact_populations, &
+      & make_thermal_ageing_populations, make_thermal_populations
+   use mesoslip_contacts_thermal_ageing, only: make_thermal_ageing_contacts
+   use mesoslip_contacts_thermal_contacts, only: make_thermal_contacts
    use mesoslip_numerics_errors, only: error_type, raise, status_invalid
    use mesoslip_numerics_kinds, only: i8
    use mesoslip_numerics_parameters, only: parameters_type
@@ -36,14 +36,6 @@ contains
       call take_contact_parameters(common, parameters, seed, realization, error)
       if (allocated(error)) return
       select case (kind)
-      case ("activated")
-         call make_contact_activated(contacts, common, parameters, error)
-      case ("activated populations")
-         call make_activated_populations(contacts, common, parameters, error)
-      case ("activated ageing populations")
-         call make_activated_ageing_populations(contacts, common, parameters, error)
-      case ("activated ageing")
-         call make_activated_ageing(contacts, common, parameters, error)
       case ("ageing")
          call make_contact_ageing(contacts, common, parameters, error)
       case ("ageing populations")
@@ -54,6 +46,14 @@ contains
          call make_contact_lattice(contacts, common, parameters, error)
       case ("populations")
          call make_contact_populations(contacts, common, parameters, error)
+      case ("thermal")
+         call make_thermal_contacts(contacts, common, parameters, error)
+      case ("thermal ageing")
+         call make_thermal_ageing_contacts(contacts, common, parameters, error)
+      case ("thermal ageing populations")
+         call make_thermal_ageing_populations(contacts, common, parameters, error)
+      case ("thermal populations")
+         call make_thermal_populations(contacts, common, parameters, error)
       case default
          call raise(error, status_invalid, "unknown kind of contacts '" // kind // "'")
       end select

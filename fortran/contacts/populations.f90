@@ -19,14 +19,13 @@ module mesoslip_contacts_populations
    private
 
    public :: contact_populations_type, new_contact_populations, make_contact_populations
-   public :: make_ageing_populations, make_activated_populations, &
-      & make_activated_ageing_populations
+   public :: make_ageing_populations, make_thermal_ageing_populations, make_thermal_populations
 
    !> Part of the contacts that attach in a step of resolution 1 at most.
    real(wp), parameter :: max_attached_part = 0.1_wp
    !> Part of a step for which nothing may attach in it. Contacts that break by activation do so in
    !> every step, and gaps of rounding between steps would come back after each delay.
-   real(wp), parameter :: activated_gap = 1.0e-3_wp
+   real(wp), parameter :: thermal_gap = 1.0e-3_wp
    !> Populations of contacts.
    type, extends(population_state_type) :: contact_populations_type
    contains
@@ -45,7 +44,6 @@ contains
 
    !> Set up populations.
    subroutine new_contact_populations(self, parameters, resolution, error)
-      !> The populations
       type(contact_populations_type), intent(out) :: self
       !> Parameters of the contacts
       type(contact_parameters_type), intent(in) :: parameters
@@ -118,7 +116,7 @@ contains
    end subroutine make_ageing_populations
 
    !> Set up populations that break by thermal activation from named numbers.
-   subroutine make_activated_populations(contacts, common, parameters, error)
+   subroutine make_thermal_populations(contacts, common, parameters, error)
       !> The contacts
       class(contacts_type), allocatable, intent(out) :: contacts
       !> Parameters that all kinds of contacts have
@@ -139,11 +137,11 @@ contains
       call activate(populations, parameters, error)
       if (allocated(error)) return
       call move_alloc(populations, contacts)
-   end subroutine make_activated_populations
+   end subroutine make_thermal_populations
 
    !> Set up populations whose thresholds change with age, and that break by thermal activation,
    !> from named numbers.
-   subroutine make_activated_ageing_populations(contacts, common, parameters, error)
+   subroutine make_thermal_ageing_populations(contacts, common, parameters, error)
       !> The contacts
       class(contacts_type), allocatable, intent(out) :: contacts
       !> Parameters that all kinds of contacts have
@@ -169,7 +167,7 @@ contains
       call activate(populations, parameters, error)
       if (allocated(error)) return
       call move_alloc(populations, contacts)
-   end subroutine make_activated_ageing_populations
+   end subroutine make_thermal_ageing_populations
 
    !> Let populations break by thermal activation.
    subroutine activate(self, parameters, error)
@@ -191,14 +189,11 @@ contains
          return
       end if
       call self%pinned%activate(rate, force / self%parameters%static_force, self%resolution)
-      self%detached%short_gap = activated_gap
+      self%detached%short_gap = thermal_gap
    end subroutine activate
 
-   !> Prepare the populations for the start of a run.
    subroutine initialize(self, state)
-      !> The populations
       class(contact_populations_type), intent(inout) :: self
-      !> One of the initial_ codes
       integer, intent(in) :: state
 
       call self%pinned%initialize(state, self%failure)
@@ -206,35 +201,24 @@ contains
 
    !> Contact force as a law, and where it holds: until contacts break, or for a step.
    subroutine offer(self, pose, law, window)
-      !> The populations
       class(contact_populations_type), intent(inout) :: self
-      !> Pose of the slider
       type(pose_type), intent(in) :: pose
-      !> The law
       type(interface_law_type), intent(out) :: law
-      !> Range in which it holds
       type(window_type), intent(out) :: window
 
       call offer_step(self, pose, law, window)
    end subroutine offer
 
-   !> Break and attach contacts after a motion of the slider.
    subroutine respond(self, before, after)
-      !> The populations
       class(contact_populations_type), intent(inout) :: self
-      !> Pose of the slider before the motion, and after it
       type(pose_type), intent(in) :: before, after
 
       call respond_to_motion(self, before, after)
    end subroutine respond
 
-   !> Move the origin of displacements.
    subroutine shift_origin(self, shift, displacement)
-      !> The populations
       class(contact_populations_type), intent(inout) :: self
-      !> Displacement of the new origin [m]
       real(wp), intent(in) :: shift
-      !> Displacement of the slider from the new origin [m]
       real(wp), intent(in) :: displacement
 
       call self%pinned%shift_origin(shift)
@@ -242,7 +226,6 @@ contains
 
    !> Number of contacts that are pinned.
    pure function pinned_count(self) result(total)
-      !> The populations
       class(contact_populations_type), intent(in) :: self
       !> Their number, in the mean of what it may be
       real(wp) :: total
@@ -250,30 +233,23 @@ contains
       total = self%pinned%number_of_contacts()
    end function pinned_count
 
-   !> Elastic energy of the pinned contacts.
    pure function elastic_energy(self, displacement) result(energy)
-      !> The populations
       class(contact_populations_type), intent(in) :: self
-      !> Displacement of the slider [m]
       real(wp), intent(in) :: displacement
-      !> Energy [J]
       real(wp) :: energy
 
       energy = self%pinned%elastic_energy(displacement)
    end function elastic_energy
 
-   !> Put the state into an archive or take it out.
    subroutine exchange(self, archive)
-      !> The populations
       class(contact_populations_type), intent(inout) :: self
-      !> The archive
       type(archive_type), intent(inout) :: archive
 
       call archive%section("contact populations")
       call exchange_contacts(self, archive)
       call self%pinned%exchange(archive)
       call self%detached%exchange(archive)
-      if (.not. self%pinned%is_activated) return
+      if (.not. self%pinned%is_thermal) return
       call archive%exchange("last_duration", self%last_duration)
       call archive%exchange("last_velocity", self%last_velocity)
       call archive%exchange("excess", self%excess)
@@ -281,9 +257,7 @@ contains
 
    !> Nothing is derived from the state: all of it is in the archive.
    subroutine rebuild(self, displacement)
-      !> The populations
       class(contact_populations_type), intent(inout) :: self
-      !> Displacement of the slider [m]
       real(wp), intent(in) :: displacement
 
       call self%pinned%forget_trial()

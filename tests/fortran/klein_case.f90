@@ -66,16 +66,16 @@ contains
       case ("ageing populations")
          call new_parameters(parameters, [character(len=name_length) :: common, ageing, &
             & "resolution"], [values, relax, 0.5_wp])
-      case ("activated populations")
+      case ("thermal populations")
          call new_parameters(parameters, [character(len=name_length) :: common, activation(3:), &
             & "resolution"], [values, bell(3:), 0.5_wp])
-      case ("activated ageing populations")
+      case ("thermal ageing populations")
          call new_parameters(parameters, [character(len=name_length) :: common, ageing, &
             & activation(3:), "resolution"], [values, relax, bell(3:), 0.5_wp])
-      case ("activated", "activated scattered")
+      case ("thermal", "thermal scattered")
          call new_parameters(parameters, [character(len=name_length) :: common, activation], &
             & [values, bell])
-      case ("activated ageing")
+      case ("thermal ageing")
          call new_parameters(parameters, [character(len=name_length) :: common, ageing, &
             & activation], [values, relax, bell])
       case ("populations")
@@ -89,12 +89,12 @@ contains
       kind = contacts
       law_of_delay = "fixed"
       if (index(contacts, "scattered") > 0) then
-         kind = merge("activated", "ensemble ", contacts(:1) == "a")
+         kind = merge("thermal ", "ensemble", contacts(:1) == "t")
          law_of_delay = "exponential"
       end if
       call parameters%add_word("delay_law", law_of_delay)
       call parameters%add_word("coupling", trim(coupling_names(merge(coupling_equal, coupling, &
-         & contacts(:1) == "a"))))
+         & any(contacts(:1) == ["a", "t"])))))
       if (index(contacts, "ageing") > 0) call parameters%add_word("ageing", "relax")
       call make_contacts(simulation%contacts, trim(kind), parameters, 1_i8, 0_i8, error)
       call check(.not. allocated(error), "contacts: " // contacts)

@@ -19,12 +19,12 @@ program test_schedules
    call runs_ahead("scattered", "prescribed", "exponential", 1.0_wp, 1.0e-5_wp)
    call runs_ahead("ageing", "prescribed", "gaussian", 0.1_wp, 5.0e-4_wp)
    call runs_ahead("ageing", "prescribed", "exponential", 1.0_wp, 0.0_wp)
-   call runs_ahead("activated", "rigid", "gaussian", 0.1_wp, 5.0e-4_wp)
-   call runs_ahead("activated", "rigid", "exponential", 1.0_wp, 0.0_wp)
-   call runs_ahead("activated", "prescribed", "gaussian", 0.1_wp, 5.0e-4_wp)
-   call runs_ahead("activated", "prescribed", "exponential", 1.0_wp, 1.0e-5_wp)
-   call runs_ahead("activated scattered", "rigid", "gaussian", 0.1_wp, 5.0e-4_wp)
-   call runs_ahead("activated scattered", "prescribed", "exponential", 1.0_wp, 1.0e-5_wp)
+   call runs_ahead("thermal", "rigid", "gaussian", 0.1_wp, 5.0e-4_wp)
+   call runs_ahead("thermal", "rigid", "exponential", 1.0_wp, 0.0_wp)
+   call runs_ahead("thermal", "prescribed", "gaussian", 0.1_wp, 5.0e-4_wp)
+   call runs_ahead("thermal", "prescribed", "exponential", 1.0_wp, 1.0e-5_wp)
+   call runs_ahead("thermal scattered", "rigid", "gaussian", 0.1_wp, 5.0e-4_wp)
+   call runs_ahead("thermal scattered", "prescribed", "exponential", 1.0_wp, 1.0e-5_wp)
    call finish()
 
 contains

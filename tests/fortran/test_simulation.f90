@@ -21,16 +21,16 @@ program test_simulation
    call closes("ensemble", "rigid", "gaussian", 0.01_wp, coupling_scaled, initial_relaxed)
    call closes("ensemble", "rigid", "exponential", 1.0_wp, coupling_equal, initial_steady)
    call closes("ensemble", "prescribed", "exponential", 1.0_wp, coupling_scaled, initial_steady)
-   call closes("activated", "rigid", "gaussian", 0.1_wp, coupling_equal, initial_relaxed)
-   call closes("activated", "rigid", "exponential", 1.0_wp, coupling_equal, initial_steady)
-   call closes("activated", "prescribed", "gaussian", 0.1_wp, coupling_equal, initial_steady)
-   call closes("activated ageing", "rigid", "gaussian", 0.1_wp, coupling_equal, initial_relaxed)
-   call closes("activated ageing", "prescribed", "gaussian", 0.1_wp, coupling_equal, &
+   call closes("thermal", "rigid", "gaussian", 0.1_wp, coupling_equal, initial_relaxed)
+   call closes("thermal", "rigid", "exponential", 1.0_wp, coupling_equal, initial_steady)
+   call closes("thermal", "prescribed", "gaussian", 0.1_wp, coupling_equal, initial_steady)
+   call closes("thermal ageing", "rigid", "gaussian", 0.1_wp, coupling_equal, initial_relaxed)
+   call closes("thermal ageing", "prescribed", "gaussian", 0.1_wp, coupling_equal, &
       & initial_relaxed)
    call closes_without_contacts("populations", "rigid", "gaussian", initial_relaxed)
-   call closes_without_contacts("activated populations", "rigid", "gaussian", initial_relaxed)
-   call closes_without_contacts("activated populations", "prescribed", "uniform", initial_steady)
-   call closes_without_contacts("activated ageing populations", "rigid", "gaussian", &
+   call closes_without_contacts("thermal populations", "rigid", "gaussian", initial_relaxed)
+   call closes_without_contacts("thermal populations", "prescribed", "uniform", initial_steady)
+   call closes_without_contacts("thermal ageing populations", "rigid", "gaussian", &
       & initial_relaxed)
    call elastic("series", "series", 1.0e-11_wp)
    call is_bounded()

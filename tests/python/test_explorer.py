@@ -43,13 +43,13 @@ from mesoslip.simulation.run_realizations import Results, run_realizations
 KLEIN = str(ROOT / "runs" / "klein.toml")
 RANGES = [one for one in CONTROLS if not one.choices and not one.is_text]
 # Starts with keys that no choice brings.
-ACTIVATED = ("contacts.coupling=equal", "contacts.thermal.rate=1e4 1/s")
+THERMAL = ("contacts.coupling=equal", "contacts.thermal.rate=1e4 1/s")
 AT_300_K = ("contacts.thermal.temperature=300 K", "contacts.thermal.activation_length=0.3 nm")
 STARTS = {
-    "contacts.thermal.rate": (*ACTIVATED, "contacts.thermal.force_ratio=0.04"),
-    "contacts.thermal.force_ratio": (*ACTIVATED, "contacts.thermal.force_ratio=0.04"),
-    "contacts.thermal.temperature": (*ACTIVATED, *AT_300_K),
-    "contacts.thermal.activation_length": (*ACTIVATED, *AT_300_K),
+    "contacts.thermal.rate": (*THERMAL, "contacts.thermal.force_ratio=0.04"),
+    "contacts.thermal.force_ratio": (*THERMAL, "contacts.thermal.force_ratio=0.04"),
+    "contacts.thermal.temperature": (*THERMAL, *AT_300_K),
+    "contacts.thermal.activation_length": (*THERMAL, *AT_300_K),
     "slider.layer_damping": ("slider.kind=layered", "slider.layers=4"),
     "slider.damping": ("slider.damping_ratio=none", "slider.damping=20 1/s"),
 }

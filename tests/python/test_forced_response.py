@@ -18,7 +18,7 @@ SLIDER = {"kind": "force", "mass": 1.47e-3, "damping": 500.0}
 
 @pytest.fixture(scope="module")
 def creep():
-    """Activated contacts under two constant forces."""
+    """Thermally activated contacts under two constant forces."""
     tables = klein_tables(
         slider=SLIDER,
         drive={"stage": [{"duration": 8.0, "force": 7.6e-6}, {"duration": 8.0, "force": 8.2e-6}]},

@@ -390,7 +390,7 @@ def test_simulations_leave_no_memory_behind():
 LONG = {"output__interval": 1e-2, "output__slip_interval": 1e-3}
 LONG_RUNS = {
     "contacts": LONG | {"run__duration": 150.0, "run__realizations": 2, "contacts__count": 1000},
-    "activated populations": LONG
+    "thermal populations": LONG
     | THERMAL
     | RANDOM
     | {"run__engine": "me", "run__duration": 12.0, "contacts__threshold__relative_width": 0.05},
@@ -448,7 +448,7 @@ def inode(path):
         return 0
 
 
-@pytest.mark.parametrize("long_run", ["contacts", long("activated populations")], indirect=True)
+@pytest.mark.parametrize("long_run", ["contacts", long("thermal populations")], indirect=True)
 def test_killed_runs_go_on(long_run, tmp_path):
     """SIGKILL and SIGTERM at moments of all kinds; tests/resume/kill.py does it for hours."""
     expected, output = tmp_path / "whole.nc", tmp_path / "killed.nc"

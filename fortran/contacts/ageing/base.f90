@@ -1,7 +1,6 @@
-!> State of contacts that age, and where one of them breaks.
+!> State of contacts that age, and where each of them breaks.
 module mesoslip_contacts_ageing_base
    use mesoslip_contacts_ageing_law, only: ageing_law_type
-   use mesoslip_contacts_ageing_lists, only: list_type
    use mesoslip_contacts_ageing_meeting, only: meet, meet_bound
    use mesoslip_contacts_individual_base, only: individual_contacts_type
    use mesoslip_contacts_individual_queue, only: contact_queue_type
@@ -13,115 +12,131 @@ module mesoslip_contacts_ageing_base
    implicit none
    private
 
-   public :: ageing_contacts_type
-   public :: tiny_gap, safety, few
+   public :: ageing_contacts_type, append, remove, position_of
+   public :: tiny_gap
    public :: in_queue, in_leaders, in_falling
    public :: leaders, falling, near
    public :: life_length, life_birth, life_limit, life_motion, no_motion, any_motion
    public :: next_length, next_limit, next_speed, next_configured, solved_together
 
-   !> Gap to its threshold over the mean breaking stretch at which a contact breaks that ages.
+   !> Gap to its threshold over the mean breaking stretch at which an ageing contact breaks
    real(wp), parameter :: tiny_gap = 1.0e-12_wp
-   !> Factor by which the motion may be foreseen worse than it was last time.
-   real(wp), parameter :: safety = 4.0_wp
-   !> Number of contacts whose thresholds fall that are all near.
-   integer, parameter :: few = 32
 
    !> Visits of contacts that take as long as an advance of a rigid slider
    real(wp), parameter :: visits_per_cost = 5.0_wp
 
-   !> Where a contact is kept: in the queue, among the leaders, among those that fall
+   !> Where a contact is kept: in the queue, among the leaders, among those whose thresholds fall
    integer, parameter :: in_queue = 0, in_leaders = 1, in_falling = 2
 
-   !> The lists of contacts
+   !> The lists: leaders, contacts whose thresholds fall, and those of them that may break soon
    integer, parameter :: lists = 3
    integer, parameter :: leaders = 1, falling = 2, near = 3
 
-   !> Numbers of the life of a contact: when it was born [s], its configured breaking stretch [m],
-   !> and the steady motion under which it breaks where it is queued: none, one, or any
+   !> Numbers of the life of a contact: time of birth [s], configured breaking stretch [m], and the
+   !> steady motion for which its limit is exact: none, the number of one, or any
    integer, parameter :: life_length = 3
    integer, parameter :: life_birth = 1, life_limit = 2, life_motion = 3
    real(wp), parameter :: no_motion = -1.0_wp, any_motion = huge(1.0_wp)
 
-   !> Numbers of the next life of a contact
+   !> Numbers of the next life of a contact: its limit [m] if it is born at a speed, that speed
+   !> [m/s], and its configured breaking stretch [m], which is set in a schedule
    integer, parameter :: next_length = 3
    integer, parameter :: next_limit = 1, next_speed = 2, next_configured = 3
-   !> Next lives that are solved together, of which some are not drawn
+   !> Next lives that are solved together; the thresholds of some may not be drawn yet
    integer, parameter :: solved_together = 64
 
-   !> Contacts that age. The limit in a record is a bound from below on the stretch at which the
-   !> contact breaks in the direction of motion.
+   !> An unordered list: the first `count` numbers are in use.
+   type :: list_type
+      integer :: count = 0
+      integer, allocatable :: contact(:)
+   end type list_type
+
+   !> Contacts that age. The limit in a record is a lower bound on the stretch at which the contact
+   !> breaks in the direction of motion.
    type, abstract, extends(individual_contacts_type) :: ageing_contacts_type
       !> How thresholds change
       type(ageing_law_type) :: ageing
-      !> Whether the slider may jump while time stands still, when the law changes
+      !> Whether the slider may jump at a fixed time when the law changes
       logical :: jumps = .false.
-      !> Whether it matters if the slider becomes faster than the speed of the queue
+      !> Whether the limits depend on the speed of the queue
       logical :: may_outrun = .true.
       !> Mean configured breaking stretch [m]
       real(wp) :: stretch = 1.0_wp
-      !> Numbers of their lives, shape (life_length, count)
+      !> Numbers of the lives, shape (life_length, count)
       real(wp), allocatable :: life(:, :)
       type(contact_queue_type) :: queue
-      !> Limit of the next life of each contact if it is born at a speed in the direction of motion
-      !> [m], and that speed [m/s], known ahead or not; its configured breaking stretch, if it is
-      !> listed in a schedule [m]; shape (next_length, count)
+      !> Numbers of the next lives, shape (next_length, count)
       real(wp), allocatable :: next(:, :)
-      !> Contacts for which it is still to be found
+      !> Contacts of which the next limit is to be solved
       integer :: unsolved_count = 0, unsolved(solved_together) = 0
-      !> Contacts that lead, whose thresholds fall, and those of them that are near. In one array,
-      !> as of several components of this type gfortran 12 frees only one
+      !> One array, because gfortran 12 frees only one of several components of this type
       type(list_type) :: list(lists)
-      !> Keys of the leaders, from the last to the first of them [m]; shape (count)
+      !> Keys of the leaders [m], in decreasing order; shape (count)
       real(wp), allocatable :: leader_key(:)
       !> Where each contact is kept, shape (count)
       integer, allocatable :: kept(:)
-      !> Coordinates between which [m], and time until which [s], no other contacts whose thresholds
-      !> fall break than those that are near
+      !> Coordinates between which [m], and time until which [s], contacts whose thresholds fall do
+      !> not break unless they are near
       real(wp) :: scan_upper = huge(1.0_wp), scan_lower = -huge(1.0_wp)
       real(wp) :: scan_time = huge(1.0_wp)
       !> Time of the last response [s]
       real(wp) :: now = 0.0_wp
-      !> Law that was offered last; acceleration of the slider under it [m/s2], and jerk, as far as
-      !> it follows from the law; error of the jerk in the last motions, and its bound [m/s3]
+      !> Law that was offered last, the predicted acceleration [m/s2] and jerk of the slider under
+      !> it, the error of the jerk in recent motions, and a bound on its error [m/s3]
       type(interface_law_type) :: law_offered
-      real(wp) :: acceleration = 0.0_wp, jerk = 0.0_wp, jerk_error = 0.0_wp, jerk_doubt = 0.0_wp
-      !> Whether the slider moves steadily in the direction of the queue, number of its motion, and
-      !> the speed for which the queue is ordered [m/s]; births and solutions since that was set
+      real(wp) :: acceleration = 0.0_wp, jerk = 0.0_wp, jerk_error = 0.0_wp, jerk_bound = 0.0_wp
+      !> Whether the slider moves steadily in the direction of the queue, number of that motion, the
+      !> speed for which limits are solved [m/s], and limits solved since it was set
       logical :: is_steady = .false.
       real(wp) :: motion = 0.0_wp, speed = 0.0_wp
       integer :: solved = 0
-      !> Whether the law stayed as it was in the last response
+      !> Whether the last response left the law unchanged
       logical :: is_unchanged = .false.
       !> Contacts of the breaks in the schedule
       integer :: listed(max_events) = 0
    contains
-      procedure :: rebuild
-      procedure :: behind_of
-      procedure :: records
-      !> Solve where a contact breaks, and where all do
-      procedure, non_overridable :: order
-      procedure, non_overridable :: order_all
-      !> Put a contact into the queue
-      procedure, non_overridable :: put
-      !> Make the bound of a contact's breaking stretch that of a time
-      procedure, non_overridable :: refresh
-      !> Coordinate before which a contact does not break on the way back
-      procedure, non_overridable :: behind_at
-      !> Whether a contact breaks, and how late it does
-      procedure, non_overridable :: is_due
-      procedure, non_overridable :: record_lateness
-      !> Add the work of visiting contacts in an advance
-      procedure, non_overridable :: count_visits
+      procedure :: rebuild, behind_of, records
+      procedure, non_overridable :: solve, solve_all, put, refresh, threshold, ahead_of, behind_at
+      procedure, non_overridable :: is_due, record_lateness, count_visits
    end type ageing_contacts_type
 
 contains
 
-   !> Solve where a contact breaks at the speed of the queue, or a bound on it.
-   subroutine order(self, contact, displacement, time)
+   !> Add a contact to a list.
+   pure subroutine append(list, contact)
+      type(list_type), intent(inout) :: list
+      integer, intent(in) :: contact
+
+      list%count = list%count + 1
+      list%contact(list%count) = contact
+   end subroutine append
+
+   !> Remove a contact from a list; the last one takes its position.
+   pure subroutine remove(list, position)
+      type(list_type), intent(inout) :: list
+      integer, intent(in) :: position
+
+      list%contact(position) = list%contact(list%count)
+      list%count = list%count - 1
+   end subroutine remove
+
+   !> Position of a contact in a list; 0 if it is not in it.
+   pure function position_of(list, contact) result(position)
+      type(list_type), intent(in) :: list
+      integer, intent(in) :: contact
+      integer :: position
+
+      do position = list%count, 1, -1
+         if (list%contact(position) == contact) return
+      end do
+      position = 0
+   end function position_of
+
+   !> Solve the limit of a contact for the speed of the queue: exact in a steady motion, else a
+   !> lower bound.
+   subroutine solve(self, contact, displacement, time)
       class(ageing_contacts_type), intent(inout) :: self
       integer, intent(in) :: contact
-      !> Displacement of the slider [m], and time [s]
       real(wp), intent(in) :: displacement, time
 
       real(wp) :: age, stretch
@@ -145,10 +160,10 @@ contains
                & self%speed)
          end if
       end associate
-   end subroutine order
+   end subroutine solve
 
-   !> Solve again where contacts break, of all that are not in the list of those that fall.
-   subroutine order_all(self, pose)
+   !> Solve all limits again, but those of falling thresholds unless the motion is steady.
+   subroutine solve_all(self, pose)
       class(ageing_contacts_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
 
@@ -160,12 +175,12 @@ contains
          if (self%kept(contact) == in_falling .and. .not. self%is_steady) cycle
          self%kept(contact) = in_queue
          if (self%life(life_motion, contact) >= any_motion) cycle
-         call self%order(contact, pose%displacement, pose%time)
+         call self%solve(contact, pose%displacement, pose%time)
       end do
       self%solved = 0
       call self%rebuild(pose%displacement)
       call self%count_visits(self%parameters%count)
-   end subroutine order_all
+   end subroutine solve_all
 
    !> Put a contact into the queue.
    subroutine put(self, contact)
@@ -173,25 +188,40 @@ contains
       integer, intent(in) :: contact
 
       self%kept(contact) = in_queue
-      call self%queue%insert(contact, &
-         & ahead_coordinate(self%record(:, contact), self%direction))
+      call self%queue%insert(contact, self%ahead_of(contact))
    end subroutine put
 
-   !> Make the bound of a contact's breaking stretch that of a time, or of the end of its scan.
+   !> Set the limit of a contact to its threshold at a time.
    subroutine refresh(self, contact, time)
       class(ageing_contacts_type), intent(inout) :: self
       integer, intent(in) :: contact
       real(wp), intent(in) :: time
 
-      self%record(row_limit, contact) = self%ageing%threshold(self%life(life_limit, contact), &
-         & self%stretch, time - self%life(life_birth, contact))
+      self%record(row_limit, contact) = self%threshold(contact, time)
    end subroutine refresh
 
-   !> Rebuild the queue and the keys of the leaders from the records.
+   !> Threshold of a contact at a time, as a stretch [m].
+   pure function threshold(self, contact, time)
+      class(ageing_contacts_type), intent(in) :: self
+      integer, intent(in) :: contact
+      real(wp), intent(in) :: time
+      real(wp) :: threshold
+
+      threshold = self%ageing%threshold(self%life(life_limit, contact), self%stretch, &
+         & time - self%life(life_birth, contact))
+   end function threshold
+
+   !> Coordinate at which a contact with its present limit breaks in the direction of motion.
+   pure function ahead_of(self, contact) result(coordinate)
+      class(ageing_contacts_type), intent(in) :: self
+      integer, intent(in) :: contact
+      real(wp) :: coordinate
+
+      coordinate = ahead_coordinate(self%record(:, contact), self%direction)
+   end function ahead_of
+
    subroutine rebuild(self, displacement)
-      !> The contacts
       class(ageing_contacts_type), intent(inout) :: self
-      !> Displacement of the slider [m]
       real(wp), intent(in) :: displacement
 
       integer :: contact, position
@@ -200,51 +230,39 @@ contains
       do contact = 1, self%parameters%count
          if (self%kept(contact) /= in_queue) cycle
          if (self%record(row_stiffness, contact) > 0.0_wp) then
-            call self%queue%insert(contact, &
-               & ahead_coordinate(self%record(:, contact), self%direction))
+            call self%queue%insert(contact, self%ahead_of(contact))
          end if
       end do
       do position = 1, self%list(leaders)%count
-         self%leader_key(position) = ahead_coordinate(self%record(:, &
-            & self%list(leaders)%contact(position)), self%direction)
+         self%leader_key(position) = self%ahead_of(self%list(leaders)%contact(position))
       end do
    end subroutine rebuild
 
-   !> Greatest coordinate at which a pinned contact may break on the way back; of those whose
-   !> thresholds fall it is known otherwise.
+   !> Falling thresholds have their own bounds (mesoslip_contacts_ageing_falling).
    pure function behind_of(self, contact) result(coordinate)
-      !> The contacts
       class(ageing_contacts_type), intent(in) :: self
-      !> Number of the contact
       integer, intent(in) :: contact
-      !> The coordinate [m]
       real(wp) :: coordinate
 
       coordinate = -huge(1.0_wp)
       if (self%kept(contact) /= in_falling) coordinate = self%behind_at(contact, self%now)
    end function behind_of
 
-   !> Coordinate before which a contact does not break on the way back, from now on.
+   !> Maximum coordinate at which a contact may break after a reversal at a time or later.
    pure function behind_at(self, contact, time) result(coordinate)
       class(ageing_contacts_type), intent(in) :: self
       integer, intent(in) :: contact
-      !> Time of now [s]
       real(wp), intent(in) :: time
       real(wp) :: coordinate
 
       real(wp) :: limit
 
-      associate (configured => self%life(life_limit, contact))
-         limit = configured
-         if (.not. self%ageing%falls(configured, self%stretch)) then
-            limit = self%ageing%threshold(configured, self%stretch, &
-               & time - self%life(life_birth, contact))
-         end if
-      end associate
+      limit = self%life(life_limit, contact)
+      if (.not. self%ageing%falls(limit, self%stretch)) limit = self%threshold(contact, time)
       coordinate = self%direction * self%record(row_origin, contact) - limit
    end function behind_at
 
-   !> Whether a contact breaks, now that its bound is that of now.
+   !> Whether a contact breaks, given that its limit is its present threshold.
    pure function is_due(self, contact, pose)
       class(ageing_contacts_type), intent(in) :: self
       integer, intent(in) :: contact
@@ -253,14 +271,13 @@ contains
 
       real(wp) :: gap
 
-      gap = ahead_coordinate(self%record(:, contact), self%direction) &
-         & - self%direction * pose%displacement
-      ! One whose threshold moves is never met to the last digit.
+      gap = self%ahead_of(contact) - self%direction * pose%displacement
+      ! A moving threshold is not reached to the last digit.
       is_due = gap <= 0.0_wp .or. (gap <= tiny_gap * self%stretch &
          & .and. self%life(life_motion, contact) < any_motion)
    end function is_due
 
-   !> Remember it as an error of the force if a contact breaks later than it should have.
+   !> Record as an error of the force that a contact breaks too late.
    pure subroutine record_lateness(self, contact, pose)
       class(ageing_contacts_type), intent(inout) :: self
       integer, intent(in) :: contact
@@ -268,34 +285,24 @@ contains
 
       real(wp) :: late
 
-      late = self%direction * pose%displacement &
-         & - ahead_coordinate(self%record(:, contact), self%direction)
+      late = self%direction * pose%displacement - self%ahead_of(contact)
       if (late > tiny_gap * self%stretch .and. self%life(life_motion, contact) < any_motion) then
          self%error_estimate = max(self%error_estimate, late * self%parameters%stiffness)
       end if
    end subroutine record_lateness
 
-   !> Add the work of visiting contacts: a segment of a run must not last long, however many of them
-   !> an advance visits.
+   !> Add the cost of visiting contacts, so that segments of a run stay short.
    pure subroutine count_visits(self, visits)
-      !> The contacts
       class(ageing_contacts_type), intent(inout) :: self
-      !> Number of visits
       integer, intent(in) :: visits
 
       self%cost = self%cost + visits / visits_per_cost
    end subroutine count_visits
 
-   !> State of some contacts.
    pure subroutine records(self, time, first, values)
-      !> The contacts
       class(ageing_contacts_type), intent(in) :: self
-      !> Time [s]
       real(wp), intent(in) :: time
-      !> The first of the contacts
       integer, intent(in) :: first
-      !> Origin [m], stiffness [N/m], 0 while it is detached, breaking stretch at the time [m],
-      !> number of renewals of each contact, shape (contact_record_length, contacts)
       real(wp), intent(out) :: values(:, :)
 
       integer :: contact, place
@@ -304,9 +311,9 @@ contains
          contact = first + place - 1
          values(:, place) = self%record([row_origin, row_stiffness, row_limit, row_renewal], &
             & contact)
-         if (.not. self%record(row_stiffness, contact) > 0.0_wp) cycle
-         values(3, place) = self%ageing%threshold(self%life(life_limit, contact), self%stretch, &
-            & time - self%life(life_birth, contact))
+         if (self%record(row_stiffness, contact) > 0.0_wp) then
+            values(3, place) = self%threshold(contact, time)
+         end if
       end do
    end subroutine records
 

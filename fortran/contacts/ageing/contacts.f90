@@ -1,30 +1,27 @@
-!> N independent contacts, whose thresholds change with their age.
+!> N independent contacts whose thresholds change with their age.
 !>
-!> A contact breaks at the first time at which its force is its threshold, while both move. Contacts
-!> are queued by where that happens if the slider keeps to a speed, which is solved once, at birth:
+!> A contact breaks at the first time at which its force equals its threshold, while both change.
+!> Contacts are queued by where that happens if the slider keeps a speed, which is solved once, at
+!> birth:
 !>
-!> - under a slider that moves steadily they break there, whether thresholds grow or fall;
-!> - where its velocity changes, that of twice its speed: a slower slider takes longer, and a
-!>   threshold that grows is then higher, so a contact does not break before. The first ones of the
-!>   queue are solved again, some together. These lead: where the next one breaks is foreseen from
-!>   the motion of the slider, and held back by what is not known of it. A slider that comes to
-!>   where a leader was to break finds it there, or a little ahead of it and foresees again. When
-!>   the slider becomes faster than the speed of the queue, all are solved again;
-!> - a threshold that falls is bounded by what it will be at the end of the window, which is where
-!>   and when the contact is foreseen to break, whether the slider moves or not. Few contacts do so
-!>   in most cases; of many, those are near that may break before the next scan.
+!> - In a steady motion they break there (mesoslip_contacts_ageing_steady).
+!> - Where the velocity changes, that speed is twice the slider's. A slower slider takes longer, and
+!>   a growing threshold is then higher, so that the queue has lower bounds
+!>   (mesoslip_contacts_ageing_motion). The first contacts of the queue are the leaders, whose
+!>   breaks are extrapolated from the motion of the slider (mesoslip_contacts_ageing_leaders).
+!> - Falling thresholds are bounded by their values at the end of a window
+!>   (mesoslip_contacts_ageing_falling).
 !>
 !> A contact that does not age breaks as in the ensemble without ageing, to the bit.
 module mesoslip_contacts_ageing_contacts
-   use mesoslip_contacts_ageing_base, only: ageing_contacts_type, falling, in_falling, in_queue, &
-      & leaders, life_birth, life_length, life_limit, life_motion, near, next_length, &
+   use mesoslip_contacts_ageing_base, only: ageing_contacts_type, append, falling, in_falling, &
+      & in_queue, leaders, life_birth, life_length, life_limit, life_motion, near, next_length, &
       & next_speed, no_motion
    use mesoslip_contacts_ageing_falling, only: bound_falling, break_falling, scan, scan_if_needed
    use mesoslip_contacts_ageing_law, only: take_ageing_law
    use mesoslip_contacts_ageing_leaders, only: add_leader, bound_leaders, break_leaders
-   use mesoslip_contacts_ageing_lists, only: append
    use mesoslip_contacts_ageing_motion, only: bound_speed, compare_motion, follow_motion, &
-      & foresee_motion, min_ratio
+      & min_ratio, predict_motion
    use mesoslip_contacts_ageing_steady, only: break_steady, end_steady, plan_steady, &
       & queue_newborn, settle_steady
    use mesoslip_contacts_base, only: contact_parameters_type, contacts_type
@@ -42,37 +39,27 @@ module mesoslip_contacts_ageing_contacts
 
    public :: contact_ageing_type, make_contact_ageing
 
-   !> A probability too small to meet among the keys of a ring of buckets.
+   !> Probability of a threshold beyond the ring of buckets of the queue
    real(wp), parameter :: negligible = 1.0e-4_wp
-   !> How near behind the slider, over the mean breaking stretch, the queue is turned round: a bound
-   !> that recedes is not to be met in ever smaller steps.
+   !> Distance of the slider from the bound behind it, over the mean breaking stretch, at which the
+   !> queue is reversed: a receding bound would be approached in ever smaller steps
    real(wp), parameter :: near_behind = 1.0e-2_wp
 
    !> Contacts that age.
    type, extends(ageing_contacts_type) :: contact_ageing_type
    contains
-      procedure :: initialize
-      procedure :: offer
-      procedure :: respond
-      procedure :: plan
-      procedure :: settle
-      procedure :: join
-      procedure :: shift_order
-      procedure :: exchange
-      procedure, private, non_overridable :: break_due, assign, face
+      procedure :: initialize, offer, respond, plan, settle, join, shift_order, exchange
+      procedure, private, non_overridable :: break_due, assign, reverse
    end type contact_ageing_type
 
 contains
 
    !> Set up contacts that age from named numbers.
    subroutine make_contact_ageing(contacts, common, parameters, error)
-      !> The contacts
       class(contacts_type), allocatable, intent(out) :: contacts
-      !> Parameters that all kinds of contacts have
       type(contact_parameters_type), intent(in) :: common
       !> The other numbers: the law of ageing, and whether the slider jumps
       type(parameters_type), intent(inout) :: parameters
-      !> Set if a number is missing or wrong, or there is not enough memory
       type(error_type), allocatable, intent(inout) :: error
 
       type(contact_ageing_type), allocatable :: self
@@ -104,7 +91,7 @@ contains
          call raise(error, status_memory, "not enough memory for the ages of contacts")
          return
       end if
-      ! As for contacts that do not age: keys that grow with time are farther along the ring.
+      ! As for contacts that do not age, but growing thresholds have keys farther along the ring.
       call self%ageing%evaluate(max(self%parameters%law%quantile(negligible), 1.0_wp), 1.0_wp, &
          & self%ageing%time, longest, rate)
       longest = max(longest, self%parameters%law%quantile(negligible), 1.0_wp)
@@ -113,11 +100,8 @@ contains
       call move_alloc(self, contacts)
    end subroutine make_contact_ageing
 
-   !> Draw all contacts for the start of a run.
    subroutine initialize(self, state)
-      !> The contacts
       class(contact_ageing_type), intent(inout) :: self
-      !> One of the initial_ codes
       integer, intent(in) :: state
 
       integer :: contact
@@ -131,15 +115,10 @@ contains
       call self%rebuild_queue(0.0_wp)
    end subroutine initialize
 
-   !> Contact force as a law, which holds until a contact breaks or attaches.
    subroutine offer(self, pose, law, window)
-      !> The contacts
       class(contact_ageing_type), intent(inout) :: self
-      !> Pose of the slider
       type(pose_type), intent(in) :: pose
-      !> The law
       type(interface_law_type), intent(out) :: law
-      !> Range in which it holds; a contact may break at its lower end if the motion is forward
       type(window_type), intent(out) :: window
 
       real(wp) :: upper, lower, end_time
@@ -149,7 +128,7 @@ contains
       lower = self%behind
       end_time = self%detached%next_due
       self%cost = 1.0_wp
-      call foresee_motion(self, pose, law)
+      call predict_motion(self, pose, law)
       call follow_motion(self, pose)
       if (self%is_steady) then
          upper = self%queue%first_key
@@ -164,9 +143,7 @@ contains
 
    !> Break all contacts that are due, then attach those that are, in the order in which they broke.
    subroutine respond(self, before, after)
-      !> The contacts
       class(contact_ageing_type), intent(inout) :: self
-      !> Pose of the slider before the motion, and after it
       type(pose_type), intent(in) :: before, after
 
       real(wp) :: breaks
@@ -189,15 +166,11 @@ contains
       call self%attach_due(after)
    end subroutine respond
 
-   !> Write a schedule of what comes next, in the steady motion of a slider that keeps to its drive.
+   !> Only the steady motion of a slider without inertia has a schedule.
    subroutine plan(self, pose, limit, schedule)
-      !> The contacts
       class(contact_ageing_type), intent(inout) :: self
-      !> Pose of the slider
       type(pose_type), intent(in) :: pose
-      !> Maximum number of breaks, and of attachments
       integer, intent(in) :: limit
-      !> The schedule; at its end if there is none
       type(schedule_type), intent(inout) :: schedule
 
       schedule%is_over = .true.
@@ -207,19 +180,15 @@ contains
       if (self%is_steady) call plan_steady(self, pose, limit, schedule)
    end subroutine plan
 
-   !> Keep the books of a schedule.
    subroutine settle(self, schedule, pose)
-      !> The contacts
       class(contact_ageing_type), intent(inout) :: self
-      !> The schedule, as far as the slider came
       type(schedule_type), intent(inout) :: schedule
-      !> Pose of the slider
       type(pose_type), intent(in) :: pose
 
       self%now = pose%time
       self%jerk_error = 0.0_wp
       call settle_steady(self, schedule)
-      ! A contact that broke a moment ago and attaches at once was not in the schedule.
+      ! A contact that has just broken and attaches at once was not in the schedule.
       if (schedule%is_over) call self%attach_due(pose)
       self%detached_count = real(self%detached%count, wp)
    end subroutine settle
@@ -233,11 +202,11 @@ contains
       integer :: contact
 
       if (self%direction * pose%displacement <= self%behind) then
-         ! The bound may be that of a contact which has broken since.
+         ! The bound may be that of a contact that has broken since.
          self%behind = self%max_behind()
          margin = 0.0_wp
          if (self%ageing%acts()) margin = near_behind * self%stretch
-         if (self%direction * pose%displacement <= self%behind + margin) call self%face(pose)
+         if (self%direction * pose%displacement <= self%behind + margin) call self%reverse(pose)
       end if
       breaks = self%breaks
       if (self%is_steady) then
@@ -259,13 +228,10 @@ contains
       if (self%breaks > breaks) self%track%generation = self%track%generation + 1
    end subroutine break_due
 
-   !> Find where a contact belongs that has attached.
+   !> Begin the life of a contact that has attached, and queue it unless its threshold falls.
    subroutine join(self, contact, pose)
-      !> The contacts
       class(contact_ageing_type), intent(inout) :: self
-      !> Number of the contact
       integer, intent(in) :: contact
-      !> Pose of the slider
       type(pose_type), intent(in) :: pose
 
       self%life(life_birth, contact) = pose%time
@@ -282,17 +248,13 @@ contains
       end if
    end subroutine join
 
-   !> Find the place of a contact that is born or drawn.
+   !> Find where a contact is kept at the beginning of its life in a motion that is not steady.
    subroutine assign(self, contact, displacement, time)
       class(contact_ageing_type), intent(inout) :: self
       integer, intent(in) :: contact
-      !> Displacement of the slider [m], and time [s]
       real(wp), intent(in) :: displacement, time
 
-      self%kept(contact) = in_queue
-      if (self%is_steady) then
-         call self%order(contact, displacement, time)
-      else if (self%ageing%falls(self%life(life_limit, contact), self%stretch) &
+      if (self%ageing%falls(self%life(life_limit, contact), self%stretch) &
          & .and. .not. self%ageing%is_old(time - self%life(life_birth, contact))) then
          self%kept(contact) = in_falling
          call append(self%list(falling), contact)
@@ -300,27 +262,26 @@ contains
          call self%refresh(contact, self%scan_time)
          self%life(life_motion, contact) = no_motion
       else
-         call self%order(contact, displacement, time)
+         self%kept(contact) = in_queue
+         call self%solve(contact, displacement, time)
       end if
    end subroutine assign
 
-   !> Turn round: keep the queue for the other direction of motion, with the thresholds of now.
-   subroutine face(self, pose)
+   !> Reverse the direction of motion for which the queue is kept.
+   subroutine reverse(self, pose)
       class(contact_ageing_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
 
       if (self%is_steady) call end_steady(self, pose)
       self%direction = -self%direction
       if (self%list(falling)%count > 0) call scan(self, pose)
-      call self%order_all(pose)
+      call self%solve_all(pose)
       self%behind = self%max_behind()
-   end subroutine face
+   end subroutine reverse
 
-   !> Move the coordinates of the last scan, and the last law.
+   !> Shift the coordinates of the last scan, and the law that was offered.
    subroutine shift_order(self, shift)
-      !> The contacts, their records moved
       class(contact_ageing_type), intent(inout) :: self
-      !> Displacement of the new origin [m]
       real(wp), intent(in) :: shift
 
       self%law_offered%offset = self%law_offered%offset - self%law_offered%stiffness * shift
@@ -330,11 +291,8 @@ contains
       end if
    end subroutine shift_order
 
-   !> Put the state into an archive or take it out.
    subroutine exchange(self, archive)
-      !> The contacts
       class(contact_ageing_type), intent(inout) :: self
-      !> The archive
       type(archive_type), intent(inout) :: archive
 
       call archive%section("contacts that age")
@@ -357,7 +315,7 @@ contains
       call archive%exchange("acceleration", self%acceleration)
       call archive%exchange("jerk", self%jerk)
       call archive%exchange("jerk_error", self%jerk_error)
-      call archive%exchange("jerk_doubt", self%jerk_doubt)
+      call archive%exchange("jerk_bound", self%jerk_bound)
       call archive%exchange("is_unchanged", self%is_unchanged)
       call archive%exchange("is_steady", self%is_steady)
       call archive%exchange("motion", self%motion)

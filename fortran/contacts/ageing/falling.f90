@@ -1,14 +1,12 @@
-!> Contacts that age whose thresholds fall.
+!> Contacts whose thresholds fall with age.
 !>
-!> A falling threshold is bounded by what it will be at the end of the window, which is where and
-!> when the contact is foreseen to break, whether the slider moves or not. Few contacts do so in
-!> most cases; of many, those are near that may break before the next scan.
+!> Such a contact may break while the slider rests, and in either direction of motion. Until the end
+!> of a window its threshold is bounded by the value at that end. Usually few thresholds fall; among
+!> many, only those contacts are looked at that are near: they may break before the next scan.
 module mesoslip_contacts_ageing_falling
-   use mesoslip_contacts_ageing_base, only: ageing_contacts_type, any_motion, falling, few, &
-      & in_queue, life_birth, life_limit, life_motion, near, tiny_gap
-   use mesoslip_contacts_ageing_lists, only: append, position_of, remove
-   use mesoslip_contacts_individual_record, only: row_limit, row_origin, ahead_coordinate, &
-      & behind_coordinate
+   use mesoslip_contacts_ageing_base, only: ageing_contacts_type, any_motion, append, falling, &
+      & in_queue, life_birth, life_limit, life_motion, near, position_of, remove, tiny_gap
+   use mesoslip_contacts_individual_record, only: row_limit, row_origin, behind_coordinate
    use mesoslip_interface_law, only: pose_type
    use mesoslip_numerics_kinds, only: wp
    implicit none
@@ -16,12 +14,14 @@ module mesoslip_contacts_ageing_falling
 
    public :: scan, scan_if_needed, bound_falling, break_falling
 
-   !> Steps of Newton's method: it converges from one side, and what is left is only foreseen worse.
+   !> Number of contacts up to which all are near, without a scan
+   integer, parameter :: max_unscanned = 32
+   !> Steps of Newton's method, which converges from one side: fewer only make windows shorter
    integer, parameter :: max_steps = 32
 
 contains
 
-   !> Find the contacts near breaking of those whose thresholds fall, and for how long they are.
+   !> Find the contacts that are near, and the range in which no others break.
    subroutine scan(self, pose)
       class(ageing_contacts_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
@@ -33,7 +33,7 @@ contains
          call retire(self, self%list(falling)%contact(position), pose%time)
       end do
       call clear_scan(self)
-      if (self%list(falling)%count > few) then
+      if (self%list(falling)%count > max_unscanned) then
          fastest = 0.0_wp
          do position = 1, self%list(falling)%count
             contact = self%list(falling)%contact(position)
@@ -41,7 +41,7 @@ contains
                & pose%time - self%life(life_birth, contact), limit, rate)
             fastest = max(fastest, -rate)
          end do
-         ! About as many scans while the slider moves by a stretch as contacts that are near.
+         ! Then a scan is about as frequent, in a stretch, as contacts are near.
          reach = 0.5_wp * self%stretch / sqrt(real(self%list(falling)%count, wp))
          self%scan_upper = self%direction * pose%displacement + reach
          self%scan_lower = self%direction * pose%displacement - reach
@@ -53,7 +53,7 @@ contains
       do position = 1, self%list(falling)%count
          contact = self%list(falling)%contact(position)
          call self%refresh(contact, self%scan_time)
-         if (ahead_coordinate(self%record(:, contact), self%direction) < self%scan_upper .or. &
+         if (self%ahead_of(contact) < self%scan_upper .or. &
             & behind_coordinate(self%record(:, contact), self%direction) > self%scan_lower) then
             call append(self%list(near), contact)
          end if
@@ -61,8 +61,7 @@ contains
       call self%count_visits(2 * self%list(falling)%count)
    end subroutine scan
 
-   !> Let the last scan hold everywhere and for ever: of few contacts all are near, and of none no
-   !> one breaks.
+   !> Let all contacts be near, everywhere and always.
    pure subroutine clear_scan(self)
       class(ageing_contacts_type), intent(inout) :: self
 
@@ -71,7 +70,7 @@ contains
       self%scan_time = huge(1.0_wp)
    end subroutine clear_scan
 
-   !> Scan the contacts whose thresholds fall if that is due; those that are old do so no more.
+   !> Scan if the slider has left the range of the last scan, or most contacts are near.
    subroutine scan_if_needed(self, pose)
       class(ageing_contacts_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
@@ -88,15 +87,15 @@ contains
       if (pose%time >= self%scan_time &
          & .or. self%direction * pose%displacement >= self%scan_upper &
          & .or. self%direction * pose%displacement <= self%scan_lower &
-         & .or. self%list(near)%count > max(few, self%list(falling)%count / 2)) then
+         & .or. self%list(near)%count > max(max_unscanned, self%list(falling)%count / 2)) then
          call scan(self, pose)
       end if
    end subroutine scan_if_needed
 
-   !> Put a contact whose threshold has fallen into the queue.
+   !> Put a contact into the queue if its threshold is constant from now on.
    subroutine retire(self, contact, time)
       class(ageing_contacts_type), intent(inout) :: self
-      !> Number of the contact; a copy, as it comes from the lists that change here
+      !> By value, because it may be an element of the lists that change here
       integer, value :: contact
       real(wp), intent(in) :: time
 
@@ -112,11 +111,11 @@ contains
       self%behind = max(self%behind, self%behind_at(contact, time))
    end subroutine retire
 
-   !> Find until where and when the slider may go before a contact breaks whose threshold falls.
+   !> Narrow a window to where no contact breaks whose threshold falls.
    subroutine bound_falling(self, pose, upper, lower, end_time)
       class(ageing_contacts_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
-      !> Coordinates between which [m], and time until which [s], no contact breaks
+      !> Coordinates along the direction of motion [m], and time [s]
       real(wp), intent(inout) :: upper, lower, end_time
 
       integer :: position
@@ -126,30 +125,30 @@ contains
       end_time = min(end_time, self%scan_time)
       do position = 1, self%list(near)%count
          associate (contact => self%list(near)%contact(position))
-            if (ahead_coordinate(self%record(:, contact), self%direction) < upper &
+            if (self%ahead_of(contact) < upper &
                & .or. behind_coordinate(self%record(:, contact), self%direction) > lower) then
-               call foresee_fall(self, contact, pose, upper, lower, end_time)
+               call exclude_break(self, contact, pose, upper, lower, end_time)
             end if
          end associate
       end do
       call self%count_visits(self%list(near)%count)
    end subroutine bound_falling
 
-   !> Where and when a contact is foreseen to break whose threshold falls: before that, it cannot.
-   pure subroutine foresee_fall(self, contact, pose, upper, lower, end_time)
+   !> Narrow a window until a contact cannot break in it.
+   pure subroutine exclude_break(self, contact, pose, upper, lower, end_time)
       class(ageing_contacts_type), intent(in) :: self
       integer, intent(in) :: contact
       type(pose_type), intent(in) :: pose
       real(wp), intent(inout) :: upper, lower, end_time
 
-      real(wp) :: age, limit, rate, stretch, speed, step, gap, longest
+      real(wp) :: age, limit, rate, stretch, speed, step, gap, max_step
       integer :: number
 
       age = pose%time - self%life(life_birth, contact)
       stretch = pose%displacement - self%record(row_origin, contact)
       speed = max(0.0_wp, sign(1.0_wp, stretch) * pose%velocity)
       stretch = abs(stretch)
-      longest = end_time - pose%time
+      max_step = end_time - pose%time
       step = 0.0_wp
       do number = 1, max_steps
          call self%ageing%evaluate(self%life(life_limit, contact), self%stretch, age + step, &
@@ -159,25 +158,24 @@ contains
          if (speed - rate > 0.0_wp) then
             step = step + gap / (speed - rate)
          else
-            step = longest
+            step = max_step
          end if
-         if (.not. step < longest) exit
+         if (.not. step < max_step) exit
       end do
-      ! A slider that jumps comes closer while time stands still: both have to have room.
+      ! A slider that jumps approaches at a fixed time: half of the gap is for that.
       if (self%jumps .and. .not. speed > 0.0_wp) step = 0.5_wp * step
-      if (step < longest) end_time = max(pose%time + step, nearest(pose%time, 1.0_wp))
-      limit = max(stretch, self%ageing%threshold(self%life(life_limit, contact), self%stretch, &
-         & end_time - self%life(life_birth, contact)))
+      if (step < max_step) end_time = max(pose%time + step, nearest(pose%time, 1.0_wp))
+      limit = max(stretch, self%threshold(contact, end_time))
       upper = min(upper, self%direction * self%record(row_origin, contact) + limit)
       lower = max(lower, self%direction * self%record(row_origin, contact) - limit)
-   end subroutine foresee_fall
+   end subroutine exclude_break
 
-   !> Break the contacts that are due of those whose thresholds fall, in either direction.
+   !> Break the contacts whose thresholds have fallen to their forces, in either direction.
    subroutine break_falling(self, pose)
       class(ageing_contacts_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
 
-      real(wp) :: stretch, limit
+      real(wp) :: stretch
       integer :: position, contact
 
       do position = self%list(near)%count, 1, -1
@@ -185,9 +183,7 @@ contains
          stretch = abs(pose%displacement - self%record(row_origin, contact)) &
             & + tiny_gap * self%stretch
          if (self%record(row_limit, contact) > stretch) cycle
-         limit = self%ageing%threshold(self%life(life_limit, contact), self%stretch, &
-            & pose%time - self%life(life_birth, contact))
-         if (limit > stretch) cycle
+         if (self%threshold(contact, pose%time) > stretch) cycle
          call self%detach(contact, pose%displacement, pose%time)
          call remove(self%list(near), position)
          call remove(self%list(falling), position_of(self%list(falling), contact))

@@ -1,9 +1,13 @@
 !> How the threshold of a contact changes with its age.
 !>
-!> A contact is born with a deviate of the threshold law, and keeps it: its threshold at the age t
-!> is mean(t) + width(t) times this deviate (model section 9). The deviate is given by the threshold
-!> that is configured, the old one of the law `relax` and that at birth of the law `log`. Thresholds
-!> grow with it at any age, so contacts of one age and force break in its order.
+!> A contact keeps the deviate with which it is born: its threshold at the age t [s] is
+!> mean(t) + width(t) times the deviate (model section 9). The deviate is given by the configured
+!> threshold, which is that of an old contact for the law `relax`, and that at birth for the law
+!> `log`. At any age the threshold increases with it, so contacts of one age and force break in
+!> the order of their configured thresholds.
+!>
+!> In the arguments below `configured` is the configured threshold of a contact and `mean` the mean
+!> over all contacts, both in the unit of the result.
 module mesoslip_contacts_ageing_law
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_numerics_errors, only: error_type, raise, status_invalid
@@ -12,8 +16,7 @@ module mesoslip_contacts_ageing_law
    implicit none
    private
 
-   public :: ageing_law_type, take_ageing_law, ageing_relax, ageing_log, ageing_names, &
-      & old
+   public :: ageing_law_type, take_ageing_law, ageing_relax, ageing_log, ageing_names, old
 
    !> Mean and width relax from those of the young to those of the old
    integer, parameter :: ageing_relax = 1
@@ -22,58 +25,38 @@ module mesoslip_contacts_ageing_law
    !> Names of the ageing_ codes
    character(len=*), parameter :: ageing_names(2) = [character(len=5) :: "relax", "log"]
 
-   !> Ages over tau_a beyond which nothing relaxes any more, as exp(-40) is below rounding.
+   !> Age over tau_a beyond which thresholds are constant: exp(-40) is below rounding
    real(wp), parameter :: old = 40.0_wp
 
-   !> Time over that in which a threshold changes, up to which its growth is that of a series: what
-   !> that leaves out is below 1e-15 of it.
+   !> Time over that in which a threshold changes, up to which its growth is a series with a
+   !> relative error below 1e-15
    real(wp), parameter :: max_ratio = 0.02_wp
 
    !> A law of ageing.
    type :: ageing_law_type
       !> One of the ageing_ codes
       integer :: kind = ageing_relax
-      !> Time tau_a [s]
-      real(wp) :: time = 1.0_wp
-      !> One over it [1/s]
-      real(wp) :: inverse_time = 1.0_wp
+      !> Time tau_a [s], and one over it [1/s]
+      real(wp) :: time = 1.0_wp, inverse_time = 1.0_wp
       !> Age of the contacts at the start of a run [s]
       real(wp) :: initial_age = 0.0_wp
-      !> Deficit of young contacts, over the mean: of the mean, and of each deviation from it
-      real(wp) :: mean_lack = 0.0_wp, width_lack = 0.0_wp
+      !> Deficit at birth of the mean threshold, over that of the old, and of each deviation from it
+      real(wp) :: mean_deficit = 0.0_wp, width_deficit = 0.0_wp
       !> Growth of the law `log` for each e-fold of the age
       real(wp) :: growth = 0.0_wp
    contains
-      !> Threshold at an age, and its rate
-      procedure, non_overridable :: evaluate
-      !> Threshold at an age
-      procedure, non_overridable :: threshold
-      !> Change of the rate in a second
-      procedure, non_overridable :: bend
-      !> Growth of a threshold from an age on
-      procedure, non_overridable :: grow
-      !> Configured threshold of the contacts that break at an age under a force
-      procedure, non_overridable :: configured
-      !> Whether the threshold falls with age
-      procedure, non_overridable :: falls
-      !> Whether any threshold changes with age, that of a contact, and whether it does so any more
-      procedure, non_overridable :: acts
-      procedure, non_overridable :: is_constant
-      procedure, non_overridable :: is_old
-      !> Deficit of the threshold of a contact at birth
-      procedure, non_overridable :: lack
+      procedure, non_overridable :: evaluate, threshold, curvature, grow, configured, deficit
+      procedure, non_overridable :: falls, acts, is_constant, is_old
    end type ageing_law_type
 
 contains
 
-   !> Take a law of ageing, and the law of thresholds of contacts that can attach with it.
+   !> Take a law of ageing from named numbers.
    subroutine take_ageing_law(self, law, parameters, error)
-      !> The law of ageing
       type(ageing_law_type), intent(out) :: self
-      !> Law of the configured thresholds, conditional on what is above the back force; on return
-      !> also on what is so when it is young
+      !> Law of the configured thresholds above the back force; on return only of those that are
+      !> above it at birth, too
       class(threshold_law_type), intent(inout) :: law
-      !> Named numbers
       type(parameters_type), intent(inout) :: parameters
       !> Set if a number is missing or wrong, or no contact can attach
       type(error_type), allocatable, intent(inout) :: error
@@ -100,8 +83,8 @@ contains
             return
          end if
          narrowing = width / law%width
-         self%mean_lack = 1.0_wp - force_ratio
-         self%width_lack = 1.0_wp - force_ratio * narrowing
+         self%mean_deficit = 1.0_wp - force_ratio
+         self%width_deficit = 1.0_wp - force_ratio * narrowing
          minimum = (law%minimum - force_ratio * (1.0_wp - narrowing)) / (force_ratio * narrowing)
          if (minimum > law%minimum) call law%reject_below(minimum, error)
       case (ageing_log)
@@ -115,18 +98,13 @@ contains
       end select
    end subroutine take_ageing_law
 
-   !> Threshold at an age, and its rate.
+   !> Threshold at an age, not negative, and its rate of change [1/s].
    pure subroutine evaluate(self, configured, mean, age, threshold, rate)
-      !> The law
       class(ageing_law_type), intent(in) :: self
-      !> Configured threshold of the contact, and the mean of all contacts, in any unit
-      real(wp), intent(in) :: configured, mean
-      !> Age, not negative [s]
-      real(wp), intent(in) :: age
-      !> Threshold at this age, in that unit, and what it grows by in a second
+      real(wp), intent(in) :: configured, mean, age
       real(wp), intent(out) :: threshold, rate
 
-      real(wp) :: lack
+      real(wp) :: deficit
 
       if (self%kind == ageing_log) then
          threshold = configured * (1.0_wp + self%growth * log(1.0_wp + age / self%time))
@@ -135,36 +113,27 @@ contains
          threshold = configured
          rate = 0.0_wp
       else
-         lack = self%lack(configured, mean)
-         if (age > 0.0_wp) lack = lack * exp(-age * self%inverse_time)
-         threshold = configured - lack
-         rate = lack * self%inverse_time
+         deficit = self%deficit(configured, mean)
+         if (age > 0.0_wp) deficit = deficit * exp(-age * self%inverse_time)
+         threshold = configured - deficit
+         rate = deficit * self%inverse_time
       end if
    end subroutine evaluate
 
-   !> Change of the rate of a threshold in a second.
-   elemental function bend(self, rate, age)
-      !> The law
+   !> Second derivative of a threshold by the age [1/s2], given its rate at the age.
+   elemental function curvature(self, rate, age)
       class(ageing_law_type), intent(in) :: self
-      !> Rate of the threshold, in any unit for a second, and age [s]
       real(wp), intent(in) :: rate, age
-      !> Its change in that unit for a second squared
-      real(wp) :: bend
+      real(wp) :: curvature
 
-      bend = -rate * self%inverse_time
-      if (self%kind == ageing_log) bend = -rate / (self%time + age)
-   end function bend
+      curvature = -rate * self%inverse_time
+      if (self%kind == ageing_log) curvature = -rate / (self%time + age)
+   end function curvature
 
-   !> Growth of a threshold from an age on. In a short time it is that of a series, which takes less
-   !> time than a transcendental function.
+   !> Growth of a threshold in a time [s] after an age, given its rate then, and its rate later.
    elemental subroutine grow(self, rate, age, time, growth, later_rate)
-      !> The law
       class(ageing_law_type), intent(in) :: self
-      !> Rate of the threshold at the age, in any unit for a second
-      real(wp), intent(in) :: rate
-      !> Age, and the time from then on, not negative [s]
-      real(wp), intent(in) :: age, time
-      !> Growth in this time, in that unit, and the rate at its end
+      real(wp), intent(in) :: rate, age, time
       real(wp), intent(out) :: growth, later_rate
 
       real(wp) :: ratio, part, square
@@ -195,26 +164,18 @@ contains
    end subroutine grow
 
    !> Deficit of the threshold of a contact at birth.
-   elemental function lack(self, configured, mean)
-      !> The law
+   elemental function deficit(self, configured, mean)
       class(ageing_law_type), intent(in) :: self
-      !> Configured threshold of the contact, and the mean of all contacts, in any unit
       real(wp), intent(in) :: configured, mean
-      !> The deficit, in that unit
-      real(wp) :: lack
+      real(wp) :: deficit
 
-      lack = self%mean_lack * mean + self%width_lack * (configured - mean)
-   end function lack
+      deficit = self%mean_deficit * mean + self%width_deficit * (configured - mean)
+   end function deficit
 
-   !> Threshold at an age.
+   !> Threshold at an age, not negative.
    pure function threshold(self, configured, mean, age)
-      !> The law
       class(ageing_law_type), intent(in) :: self
-      !> Configured threshold of the contact, and the mean of all contacts, in any unit
-      real(wp), intent(in) :: configured, mean
-      !> Age, not negative [s]
-      real(wp), intent(in) :: age
-      !> Threshold at this age, in that unit
+      real(wp), intent(in) :: configured, mean, age
       real(wp) :: threshold
 
       real(wp) :: rate
@@ -222,76 +183,60 @@ contains
       call self%evaluate(configured, mean, age, threshold, rate)
    end function threshold
 
-   !> Configured threshold of the contacts that break at an age under a force.
+   !> Configured threshold of the contacts that break at an age under a force, both over the mean.
    pure function configured(self, force, age)
-      !> The law
       class(ageing_law_type), intent(in) :: self
-      !> Force over the mean configured threshold
-      real(wp), intent(in) :: force
-      !> Age, not negative [s]
-      real(wp), intent(in) :: age
-      !> Configured threshold over the mean: that of contacts whose threshold is the force
+      real(wp), intent(in) :: force, age
       real(wp) :: configured
 
-      real(wp) :: lack
+      real(wp) :: remaining
 
       if (self%kind == ageing_log) then
          configured = force / (1.0_wp + self%growth * log(1.0_wp + age / self%time))
       else if (age > old * self%time) then
          configured = force
       else
-         lack = exp(-age / self%time)
-         configured = (force + (self%mean_lack - self%width_lack) * lack) &
-            & / (1.0_wp - self%width_lack * lack)
+         remaining = exp(-age / self%time)
+         configured = (force + (self%mean_deficit - self%width_deficit) * remaining) &
+            & / (1.0_wp - self%width_deficit * remaining)
       end if
    end function configured
 
-   !> Whether the threshold falls with age: the young are weaker in the mean, but often wider
-   !> spread, so that the strongest of them become weaker.
+   !> Whether the threshold falls with age: young thresholds are lower in the mean but often more
+   !> scattered, so that the highest of them fall.
    pure function falls(self, configured, mean)
-      !> The law
       class(ageing_law_type), intent(in) :: self
-      !> Configured threshold of the contact, and the mean of all contacts, in any unit
       real(wp), intent(in) :: configured, mean
-      !> Whether it does
       logical :: falls
 
-      falls = self%lack(configured, mean) < 0.0_wp
+      falls = self%deficit(configured, mean) < 0.0_wp
    end function falls
 
    !> Whether any threshold changes with age.
    pure function acts(self)
-      !> The law
       class(ageing_law_type), intent(in) :: self
-      !> Whether one does
       logical :: acts
 
-      acts = abs(self%growth) + abs(self%mean_lack) + abs(self%width_lack) > 0.0_wp
+      acts = abs(self%growth) + abs(self%mean_deficit) + abs(self%width_deficit) > 0.0_wp
    end function acts
 
    !> Whether the threshold of a contact is the same at any age.
    pure function is_constant(self, configured, mean)
-      !> The law
       class(ageing_law_type), intent(in) :: self
-      !> Configured threshold of the contact, and the mean of all contacts, in any unit
       real(wp), intent(in) :: configured, mean
-      !> Whether it is
       logical :: is_constant
 
       if (self%kind == ageing_log) then
          is_constant = .not. self%growth > 0.0_wp
       else
-         is_constant = .not. abs(self%lack(configured, mean)) > 0.0_wp
+         is_constant = .not. abs(self%deficit(configured, mean)) > 0.0_wp
       end if
    end function is_constant
 
-   !> Whether the threshold does not change any more.
+   !> Whether thresholds are constant from an age on.
    pure function is_old(self, age)
-      !> The law
       class(ageing_law_type), intent(in) :: self
-      !> Age [s]
       real(wp), intent(in) :: age
-      !> Whether that is so
       logical :: is_old
 
       is_old = self%kind == ageing_relax .and. age > old * self%time

@@ -1,4 +1,8 @@
-!> Where a contact breaks whose stretch grows steadily while its threshold changes with age.
+!> Threshold at which a contact breaks whose stretch grows steadily while it ages.
+!>
+!> In the arguments below `configured` is the configured threshold of the contact and `mean` the
+!> mean over all contacts, as stretches [m]. At the age [s], not negative, the contact has the
+!> stretch [m], which grows at the speed [m/s], positive.
 module mesoslip_contacts_ageing_meeting
    use mesoslip_contacts_ageing_law, only: ageing_law_type, ageing_log, ageing_relax, old
    use mesoslip_numerics_kinds, only: wp
@@ -8,77 +12,65 @@ module mesoslip_contacts_ageing_meeting
    public :: meet, meet_bound, meet_newborn
 
    !> Coefficients of exp(T(p)), where T = p exp(T) < 1, in powers of (1 - e p)^(1/2), in which it
-   !> is analytic; right to 5e-5.
+   !> is analytic; exact to 5e-5
    real(wp), parameter :: tree_start(0:6) = [2.718238_wp, -3.839751_wp, 4.452257_wp, &
       & -4.483397_wp, 3.511888_wp, -1.760118_wp, 0.400914_wp]
-   !> Speed times time beyond which thresholds do not change while a contact is stretched [m]
+   !> Speed times tau_a beyond which thresholds do not change while a contact is stretched [m]
    real(wp), parameter :: max_scale = 1.0e30_wp
    real(wp), parameter :: euler = 2.718281828459045235_wp
-   !> Step of an iteration of the fourth order after which nothing is left to correct
+   !> Size of a step of fourth order after which the error is below rounding
    real(wp), parameter :: max_step = 1.0e-4_wp
-   !> Rate over speed up to which there is one step only
+   !> Rate over speed up to which one such step is enough
    real(wp), parameter :: max_plain = 0.9_wp
-   !> Change of the rate of a threshold, relative, up to which a parabola is a close bound
+   !> Relative change of the rate of a threshold up to which a parabola is a close bound
    real(wp), parameter :: max_bend = 0.2_wp
-   !> The same of Newton's method, relative
+   !> Relative size of a step of Newton's method after which the error is below rounding
    real(wp), parameter :: max_newton_step = 1.0e-8_wp
-   !> Iterations, more than are ever needed but where a contact just does not break
+   !> Maximum number of steps; so many are needed only where a contact just does not break
    integer, parameter :: max_iterations = 60
 
 contains
 
-   !> Threshold at which a contact breaks whose stretch grows at a steady speed.
+   !> Threshold at which a contact breaks [m]; its present threshold if the stretch is above it.
    !>
-   !> It is the threshold that a slower contact at least has where it breaks, if thresholds grow.
+   !> A growing threshold is higher where a slower contact breaks, so that this is a lower bound for
+   !> lower speeds.
    !>
    !> With the distance w in units of s = speed times tau_a, the threshold is U - L exp(-w) and the
-   !> stretch is x + s w. Where both are the same the threshold is U - s T, with T = p exp(T) and
-   !> p = L/s exp(-(U - x)/s), of which the lesser solution is meant: T is the rate of the threshold
-   !> over the speed (R. Corless et al., Adv. Comput. Math. 5 (1996) 329).
+   !> stretch is x + s w. They meet at the threshold U - s T, where T is the lesser solution of
+   !> T = p exp(T) with p = L/s exp(-(U - x)/s), the rate of the threshold over the speed
+   !> (R. Corless et al., Adv. Comput. Math. 5 (1996) 329).
    pure function meet(law, configured, mean, age, stretch, speed) result(threshold)
-      !> The law
       type(ageing_law_type), intent(in) :: law
-      !> Configured threshold of the contact, and the mean of all contacts, as stretches [m]
-      real(wp), intent(in) :: configured, mean
-      !> Age, not negative [s]
-      real(wp), intent(in) :: age
-      !> Stretch at this age [m], and the speed at which it grows, positive [m/s]
-      real(wp), intent(in) :: stretch, speed
-      !> Threshold where it breaks, that of now if the stretch is beyond it [m]
+      real(wp), intent(in) :: configured, mean, age, stretch, speed
       real(wp) :: threshold
 
-      real(wp) :: lack, scale, distance, part
+      real(wp) :: deficit, scale, distance
 
       scale = speed * law%time
       if (law%kind == ageing_log) then
          threshold = meet_grown(law, configured, age / law%time, stretch, scale)
          return
       end if
-      lack = law%lack(configured, mean)
-      if (age > 0.0_wp) lack = lack * exp(-min(age / law%time, old))
-      threshold = configured - lack
+      deficit = law%deficit(configured, mean)
+      if (age > 0.0_wp) deficit = deficit * exp(-min(age / law%time, old))
+      threshold = configured - deficit
       if (threshold <= stretch .or. scale > max_scale) return
       distance = (configured - stretch) / scale
-      if (lack > 0.0_wp) then
+      if (deficit > 0.0_wp) then
          threshold = configured
-         if (distance < old) threshold = configured - scale * tree(lack / scale * exp(-distance))
-      else if (lack < 0.0_wp) then
-         part = lack / scale
-         threshold = configured - lack * exp(-fallen(distance, part))
+         if (distance < old) then
+            threshold = configured - scale * tree(deficit / scale * exp(-distance))
+         end if
+      else if (deficit < 0.0_wp) then
+         threshold = configured - deficit * exp(-fallen(distance, deficit / scale))
       end if
    end function meet
 
-   !> A bound from below on that threshold, which takes less time where it is near, if it grows.
+   !> A lower bound on that threshold, which is found faster where it is near and grows.
    pure function meet_bound(law, configured, mean, age, stretch, speed) result(threshold)
-      !> The law
       type(ageing_law_type), intent(in) :: law
-      !> Configured threshold of the contact, and the mean of all contacts, as stretches [m]
-      real(wp), intent(in) :: configured, mean
-      !> Age, not negative [s]
-      real(wp), intent(in) :: age
-      !> Stretch at this age [m], and the speed at which it grows, positive [m/s]
-      real(wp), intent(in) :: stretch, speed
-      !> Threshold that the contact has where it breaks, or a lower one [m]
+      real(wp), intent(in) :: configured, mean, age, stretch, speed
       real(wp) :: threshold
 
       real(wp) :: rate, bend, gap, time, slowness
@@ -86,9 +78,9 @@ contains
       call law%evaluate(configured, mean, age, threshold, rate)
       gap = threshold - stretch
       if (.not. (gap > 0.0_wp .and. rate > 0.0_wp) .or. speed * law%time > max_scale) return
-      bend = 0.5_wp * law%bend(rate, age)
+      bend = 0.5_wp * law%curvature(rate, age)
       if (2.0_wp * gap * abs(bend) < max_bend * rate * speed .and. 2.0_wp * rate < speed) then
-         ! The third derivatives of thresholds are positive: a parabola is below.
+         ! The third derivatives of thresholds are positive: a parabola is a lower bound.
          slowness = 1.0_wp / speed
          time = gap * slowness
          time = (gap + (rate + bend * time) * time) * slowness
@@ -98,36 +90,31 @@ contains
       end if
    end function meet_bound
 
-   !> The same as meet for many contacts at birth: together they take less time.
+   !> The same as meet, to the bit, for many contacts at birth, which is faster together.
    pure subroutine meet_newborn(law, configured, mean, stretch, speed, threshold)
-      !> The law
       type(ageing_law_type), intent(in) :: law
-      !> Configured thresholds of the contacts, and the mean of all contacts, as stretches [m]
       real(wp), intent(in), contiguous :: configured(:)
-      real(wp), intent(in) :: mean
-      !> Stretch at birth [m], and the speed at which it grows, positive [m/s]
-      real(wp), intent(in) :: stretch, speed
-      !> Thresholds where they break, the same as those of meet to the bit; shape (contacts) [m]
+      real(wp), intent(in) :: mean, stretch, speed
       real(wp), intent(out), contiguous :: threshold(:)
 
       real(wp), dimension(size(configured)) :: p, t, step, slope
       logical :: is_plain(size(configured))
-      real(wp) :: lack, scale, distance
+      real(wp) :: deficit, scale, distance
       integer :: contact
 
       scale = speed * law%time
       is_plain = law%kind == ageing_relax .and. scale <= max_scale
       do contact = 1, size(configured)
-         lack = law%lack(configured(contact), mean)
+         deficit = law%deficit(configured(contact), mean)
          distance = (configured(contact) - stretch) / scale
-         is_plain(contact) = is_plain(contact) .and. lack > 0.0_wp .and. distance < old &
-            & .and. configured(contact) - lack > stretch
+         is_plain(contact) = is_plain(contact) .and. deficit > 0.0_wp .and. distance < old &
+            & .and. configured(contact) - deficit > stretch
          p(contact) = 0.0_wp
-         if (is_plain(contact)) p(contact) = lack / scale * exp(-distance)
+         if (is_plain(contact)) p(contact) = deficit / scale * exp(-distance)
       end do
       t = first_tree(p)
       do contact = 1, size(configured)
-         ! Under a condition, as the exponential function of vectors has another last digit.
+         ! Conditional, because a vectorized exponential function has another last digit.
          slope(contact) = 0.0_wp
          if (is_plain(contact)) slope(contact) = p(contact) * exp(t(contact))
          if (slope(contact) < max_plain) cycle
@@ -142,9 +129,8 @@ contains
       end do
    end subroutine meet_newborn
 
-   !> Solution below 1 of T = p exp(T).
+   !> Solution below 1 of T = p exp(T), where p is between 0 and 1/e.
    pure function tree(p) result(t)
-      !> Not negative, and at most 1/e
       real(wp), intent(in) :: p
       real(wp) :: t
 
@@ -160,7 +146,7 @@ contains
       end do
    end function tree
 
-   !> The same to a few digits.
+   !> The same by a series.
    elemental function first_tree(p) result(t)
       real(wp), intent(in) :: p
       real(wp) :: t
@@ -174,13 +160,11 @@ contains
       end associate
    end function first_tree
 
-   !> One step of the fourth order.
+   !> One step of the fourth order to T, given p exp(T) below 1, and its size over the distance to
+   !> where the solution ends.
    elemental subroutine improve_tree(grown, t, change)
-      !> p exp(t), below 1
       real(wp), intent(in) :: grown
-      !> The solution
       real(wp), intent(inout) :: t
-      !> Size of the step, over that to where the solution ends
       real(wp), intent(out) :: change
 
       real(wp) :: slope, step
@@ -192,9 +176,9 @@ contains
       change = abs(slope * step)
    end subroutine improve_tree
 
-   !> Distance w after which a threshold that falls is met: w + part exp(-w) = distance.
+   !> Solution w of w + part exp(-w) = distance, the distance to a falling threshold with the
+   !> negative deficit `part`, less than the distance.
    pure function fallen(distance, part) result(w)
-      !> Distance to the old threshold, and what is lacking at first, negative: distance > part
       real(wp), intent(in) :: distance, part
       real(wp) :: w
 
@@ -212,11 +196,11 @@ contains
 
    !> The same as meet for the law `log`.
    !>
-   !> With z = 1 + t/tau_a the stretch is x + s (z - z_0), the threshold U (1 + beta ln z): the
-   !> greater solution of z - kappa ln z = (U - x)/s + z_0 with kappa = U beta/s.
+   !> With z = 1 + t/tau_a the stretch is x + s (z - z_0) and the threshold U (1 + beta ln z). They
+   !> meet at the greater solution of z - kappa ln z = (U - x)/s + z_0 with kappa = U beta/s. Here
+   !> the age is in units of tau_a, and s is the scale.
    pure function meet_grown(law, configured, age, stretch, scale) result(threshold)
       type(ageing_law_type), intent(in) :: law
-      !> Configured threshold [m], age over tau_a, stretch [m], speed times tau_a [m]
       real(wp), intent(in) :: configured, age, stretch, scale
       real(wp) :: threshold
 
@@ -228,7 +212,7 @@ contains
       kappa = configured * law%growth / scale
       z = 1.0_wp + age
       wanted = (configured - stretch) / scale + z
-      ! To the right of the least value: from there Newton's method comes from one side.
+      ! From the right of the minimum Newton's method converges from one side.
       if (wanted > z) z = wanted + kappa * log(wanted)
       z = max(z, 2.0_wp * kappa)
       do iteration = 1, max_iterations

@@ -1,33 +1,27 @@
-!> Motion of the slider as contacts that age foresee it, and the speed for which they are queued.
-!>
-!> Where the velocity of the slider changes, they are queued for twice its speed: a slower slider
-!> takes longer, and a threshold that grows is then higher, so that a contact does not break before.
-!> When the slider becomes faster than the speed of the queue, all are solved again. Where it comes
-!> next is foreseen from its acceleration and its jerk.
+!> Motion of the slider as contacts that age predict it, and the speed for which they are queued.
 module mesoslip_contacts_ageing_motion
-   use mesoslip_contacts_ageing_base, only: ageing_contacts_type, safety
+   use mesoslip_contacts_ageing_base, only: ageing_contacts_type
    use mesoslip_contacts_ageing_steady, only: begin_steady, end_steady
    use mesoslip_interface_law, only: interface_law_type, pose_type
    use mesoslip_numerics_kinds, only: wp
    implicit none
    private
 
-   public :: follow_motion, foresee_motion, compare_motion, bound_speed, min_ratio
+   public :: follow_motion, predict_motion, compare_motion, bound_speed, min_ratio
 
    !> Speed of the queue over that of the slider: when it is set, and when it is too low or too high
    real(wp), parameter :: set_ratio = 2.0_wp, min_speed_ratio = 1.3_wp, max_speed_ratio = 8.0_wp
    !> Speed over that of ageing below which contacts are old where they break
    real(wp), parameter :: min_ratio = 0.05_wp
-   !> How much of an error of the jerk is remembered at the next motion
-   real(wp), parameter :: memory = 0.99_wp
-   !> Error of the jerk, relative, that is expected in any case
-   real(wp), parameter :: min_jerk_error = 1.0e-3_wp
-   !> Time within which a slider becomes faster, if it does at all [s]
+   !> Factor of the last error of the jerk in a bound on the next, factor by which errors decay from
+   !> motion to motion, and minimum relative error
+   real(wp), parameter :: safety = 4.0_wp, memory = 0.99_wp, min_jerk_error = 1.0e-3_wp
+   !> Maximum duration for which a bound on the velocity is extrapolated [s]
    real(wp), parameter :: max_time = 1.0e9_wp
 
 contains
 
-   !> See how the slider moves now, and to it that the queue is ordered for that.
+   !> Prepare the queue for the present motion of the slider, steady or not.
    subroutine follow_motion(self, pose)
       class(ageing_contacts_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
@@ -47,31 +41,30 @@ contains
       end if
    end subroutine follow_motion
 
-   !> Keep the speed of the queue above that of the slider, but not by far.
+   !> Keep the speed of the queue above that of the slider, but not far above.
    subroutine set_speed(self, pose)
       class(ageing_contacts_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
 
-      real(wp) :: least
+      real(wp) :: min_speed
 
-      least = min_ratio * self%stretch * self%ageing%inverse_time
+      min_speed = min_ratio * self%stretch * self%ageing%inverse_time
       if (min_speed_ratio * abs(pose%velocity) > self%speed) then
-         self%speed = max(set_ratio * abs(pose%velocity), least)
-         call self%order_all(pose)
+         self%speed = max(set_ratio * abs(pose%velocity), min_speed)
+         call self%solve_all(pose)
       else if (self%solved > self%parameters%count &
-         & .and. max_speed_ratio * max(abs(pose%velocity), least) < self%speed) then
-         ! A contact that is queued for a higher speed is queued for a lower one as well.
-         self%speed = max(set_ratio * abs(pose%velocity), least)
+         & .and. max_speed_ratio * max(abs(pose%velocity), min_speed) < self%speed) then
+         ! Limits for a higher speed are lower bounds for a lower one, too.
+         self%speed = max(set_ratio * abs(pose%velocity), min_speed)
          self%solved = 0
       end if
    end subroutine set_speed
 
-   !> Foresee the motion of the slider under a law that is offered to it. The acceleration that it
-   !> comes with is that under the law before.
-   pure subroutine foresee_motion(self, pose, law)
+   !> Predict acceleration and jerk of the slider under a law, from its pose with the acceleration
+   !> under the law before.
+   pure subroutine predict_motion(self, pose, law)
       class(ageing_contacts_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
-      !> The law
       type(interface_law_type), intent(in) :: law
 
       real(wp) :: change
@@ -83,12 +76,12 @@ contains
       self%acceleration = pose%acceleration - pose%inverse_mass * change
       self%jerk = -(pose%own_rate**2 + pose%inverse_mass * law%stiffness) * pose%velocity &
          & - pose%inverse_mass * law%drag * self%acceleration
-      ! What a drive or a damper may do that is as fast as the slider itself.
-      self%jerk_doubt = safety * self%jerk_error + min_jerk_error * abs(self%jerk) &
+      ! A drive or a damper may change as fast as the slider itself.
+      self%jerk_bound = safety * self%jerk_error + min_jerk_error * abs(self%jerk) &
          & + pose%own_rate * (pose%own_rate * abs(pose%velocity) + abs(self%acceleration))
-   end subroutine foresee_motion
+   end subroutine predict_motion
 
-   !> Compare a motion with what was foreseen of it.
+   !> Compare a motion with its prediction.
    pure subroutine compare_motion(self, before, after)
       class(ageing_contacts_type), intent(inout) :: self
       type(pose_type), intent(in) :: before, after
@@ -101,8 +94,7 @@ contains
          & / duration, memory * self%jerk_error)
    end subroutine compare_motion
 
-   !> End a window before the slider may become faster than the speed of the queue, by what is known
-   !> of its motion.
+   !> End a window before the slider may become faster than the speed of the queue.
    pure subroutine bound_speed(self, pose, end_time)
       class(ageing_contacts_type), intent(in) :: self
       type(pose_type), intent(in) :: pose
@@ -112,7 +104,7 @@ contains
 
       room = self%speed - abs(pose%velocity)
       pull = abs(self%acceleration)
-      bend = 0.5_wp * (abs(self%jerk) + self%jerk_doubt)
+      bend = 0.5_wp * (abs(self%jerk) + self%jerk_bound)
       time = min(end_time - pose%time, max_time)
       if (2.0_wp * (pull + bend * time) * time <= room) return
       if (4.0_wp * pull * time > room) time = 0.25_wp * room / pull

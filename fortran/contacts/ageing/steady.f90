@@ -1,17 +1,15 @@
 !> Contacts that age under a slider that moves steadily.
 !>
-!> They are queued by where they break if it goes on so, whether their thresholds grow or fall,
-!> which is solved once, at birth, or before that for the next lives of several contacts together.
+!> They are queued by where they break if the motion continues, whether their thresholds grow or
+!> fall. That is solved once, at birth, or before it for several contacts together.
 module mesoslip_contacts_ageing_steady
-   use mesoslip_contacts_ageing_base, only: ageing_contacts_type, any_motion, falling, in_falling, &
-      & in_queue, leaders, life_birth, life_limit, life_motion, near, next_configured, &
-      & next_length, next_limit, next_speed, solved_together
+   use mesoslip_contacts_ageing_base, only: ageing_contacts_type, any_motion, append, falling, &
+      & in_falling, in_queue, leaders, life_birth, life_limit, life_motion, next_configured, &
+      & next_limit, next_speed, solved_together
    use mesoslip_contacts_ageing_falling, only: scan
-   use mesoslip_contacts_ageing_lists, only: append
    use mesoslip_contacts_ageing_meeting, only: meet, meet_newborn
    use mesoslip_contacts_individual_births, only: drag_of
-   use mesoslip_contacts_individual_record, only: row_limit, row_next, row_origin, row_stiffness, &
-      & ahead_coordinate
+   use mesoslip_contacts_individual_record, only: row_limit, row_next, row_origin, row_stiffness
    use mesoslip_interface_law, only: pose_type
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_schedule, only: max_events, schedule_type
@@ -22,37 +20,34 @@ module mesoslip_contacts_ageing_steady
 
 contains
 
-   !> Order all for a steady motion, whether their thresholds grow or fall.
+   !> Queue all contacts for a steady motion, whether their thresholds grow or fall.
    subroutine begin_steady(self, pose)
       class(ageing_contacts_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
 
-      integer :: position
-      logical :: was_slower
+      integer :: number, position
 
       self%is_steady = .true.
       self%motion = self%motion + 1.0_wp
-      was_slower = abs(pose%velocity) > self%speed
-      self%speed = abs(pose%velocity)
-      if (was_slower) then
-         call self%order_all(pose)
+      if (abs(pose%velocity) > self%speed) then
+         self%speed = abs(pose%velocity)
+         call self%solve_all(pose)
       else
-         do position = 1, self%list(leaders)%count
-            call self%order(self%list(leaders)%contact(position), pose%displacement, pose%time)
-            call self%put(self%list(leaders)%contact(position))
+         self%speed = abs(pose%velocity)
+         do number = leaders, falling
+            do position = 1, self%list(number)%count
+               associate (contact => self%list(number)%contact(position))
+                  call self%solve(contact, pose%displacement, pose%time)
+                  call self%put(contact)
+               end associate
+            end do
          end do
-         do position = 1, self%list(falling)%count
-            call self%order(self%list(falling)%contact(position), pose%displacement, pose%time)
-            call self%put(self%list(falling)%contact(position))
-         end do
-         self%list(leaders)%count = 0
       end if
       if (self%list(falling)%count > 0) self%behind = self%max_behind()
-      self%list(falling)%count = 0
-      self%list(near)%count = 0
+      self%list%count = 0
    end subroutine begin_steady
 
-   !> Take those out of the queue that may break earlier when the motion is another.
+   !> Take contacts with falling thresholds out of the queue: otherwise they may break earlier.
    subroutine end_steady(self, pose)
       class(ageing_contacts_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
@@ -73,7 +68,7 @@ contains
       call self%rebuild(pose%displacement)
    end subroutine end_steady
 
-   !> Break the contacts that are due under a steady motion; others were queued for a faster one.
+   !> Break the contacts that are due; those queued for a faster motion are solved again before.
    subroutine break_steady(self, pose)
       class(ageing_contacts_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
@@ -83,9 +78,8 @@ contains
       do while (self%queue%first_key <= self%direction * pose%displacement)
          call self%queue%pop(self%record, contact)
          if (self%life(life_motion, contact) < self%motion) then
-            call self%order(contact, pose%displacement, pose%time)
-            if (ahead_coordinate(self%record(:, contact), self%direction) &
-               & > self%direction * pose%displacement) then
+            call self%solve(contact, pose%displacement, pose%time)
+            if (self%ahead_of(contact) > self%direction * pose%displacement) then
                call self%put(contact)
                cycle
             end if
@@ -95,33 +89,39 @@ contains
       end do
    end subroutine break_steady
 
-   !> Queue a contact that is born in a steady motion.
+   !> Begin the life of a contact that is born in a steady motion.
    subroutine queue_newborn(self, contact)
       class(ageing_contacts_type), intent(inout) :: self
       integer, intent(in) :: contact
 
-      real(wp) :: stretch, solved(next_length)
-
-      stretch = self%parameters%back_force_ratio * self%stretch
-      solved = self%next(:, contact)
-      self%next(next_speed, contact) = 0.0_wp
-      associate (life => self%life(:, contact))
+      self%kept(contact) = in_queue
+      associate (life => self%life(:, contact), next => self%next(:, contact))
          if (self%ageing%is_constant(life(life_limit), self%stretch)) then
-            self%kept(contact) = in_queue
             life(life_motion) = any_motion
+            next(next_speed) = 0.0_wp
             return
          end if
-         self%kept(contact) = in_queue
          life(life_motion) = self%motion
-         if (abs(solved(next_speed) - self%speed) > 0.0_wp) then
-            self%record(row_limit, contact) = meet(self%ageing, life(life_limit), self%stretch, &
-               & 0.0_wp, stretch, self%speed)
-         else
-            self%record(row_limit, contact) = solved(next_limit)
+         if (abs(next(next_speed) - self%speed) > 0.0_wp) then
+            next(next_limit) = newborn_limit(self, life(life_limit))
          end if
+         self%record(row_limit, contact) = next(next_limit)
+         next(next_speed) = 0.0_wp
       end associate
       call solve_later(self, contact)
    end subroutine queue_newborn
+
+   !> Limit of a contact with a configured breaking stretch [m] that is born in the steady motion.
+   pure function newborn_limit(self, configured) result(limit)
+      class(ageing_contacts_type), intent(in) :: self
+      real(wp), intent(in) :: configured
+      real(wp) :: limit
+
+      limit = meet(self%ageing, configured, self%stretch, 0.0_wp, &
+         & self%parameters%back_force_ratio * self%stretch, self%speed)
+   end function newborn_limit
+
+   !> Have the next limit of a contact solved with those of others.
 
    !> Have the next life of a contact solved with those of others.
    subroutine solve_later(self, contact)
@@ -131,21 +131,18 @@ contains
       self%solved = self%solved + 1
       self%unsolved_count = self%unsolved_count + 1
       self%unsolved(self%unsolved_count) = contact
-      if (self%unsolved_count == solved_together) call solve_next_lives(self, &
-         & self%parameters%back_force_ratio * self%stretch)
+      if (self%unsolved_count == solved_together) call solve_next_lives(self)
    end subroutine solve_later
 
-   !> Solve ahead where contacts will break in their next lives, if their thresholds are drawn.
-   subroutine solve_next_lives(self, stretch)
+   !> Solve the next limits of contacts whose next thresholds are drawn.
+   subroutine solve_next_lives(self)
       class(ageing_contacts_type), intent(inout) :: self
-      !> Stretch at birth [m]
-      real(wp), intent(in) :: stretch
 
       real(wp), dimension(solved_together) :: configured, limit
-      integer :: contact(solved_together), position, number, left
+      integer :: contact(solved_together), position, number, remaining
 
       number = 0
-      left = 0
+      remaining = 0
       do position = 1, self%unsolved_count
          associate (one => self%unsolved(position))
             if (self%record(row_next, one) > 0.0_wp) then
@@ -154,28 +151,26 @@ contains
                configured(number) = self%record(row_next, one) * self%parameters%static_force &
                   & / self%parameters%stiffness
             else
-               left = left + 1
-               self%unsolved(left) = one
+               remaining = remaining + 1
+               self%unsolved(remaining) = one
             end if
          end associate
       end do
-      ! Of few contacts the same ones are there again and again: those left out are solved at birth.
-      self%unsolved_count = min(left, solved_together / 2)
-      call meet_newborn(self%ageing, configured(:number), self%stretch, stretch, self%speed, &
-         & limit(:number))
+      ! Few contacts would fill the list again and again: those dropped are solved at birth.
+      self%unsolved_count = min(remaining, solved_together / 2)
+      call meet_newborn(self%ageing, configured(:number), self%stretch, &
+         & self%parameters%back_force_ratio * self%stretch, self%speed, limit(:number))
       do position = 1, number
          self%next(:next_speed, contact(position)) = [limit(position), self%speed]
       end do
    end subroutine solve_next_lives
 
-   !> Write a schedule of what comes next in a steady motion: the breaks at the front of the queue,
-   !> up to a contact that was queued for another motion, and about as many attachments.
+   !> Write a schedule in a steady motion: the breaks at the front of the queue, up to a contact
+   !> that was queued for another motion, and about as many attachments.
    subroutine plan_steady(self, pose, limit, schedule)
       class(ageing_contacts_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
-      !> Maximum number of breaks, and of attachments
       integer, intent(in) :: limit
-      !> The schedule; at its end if there is none
       type(schedule_type), intent(inout) :: schedule
 
       integer :: number, event, contact(max_events)
@@ -199,31 +194,24 @@ contains
          & schedule, contact)
       call solve_listed(self, contact(:schedule%attachments), schedule%attach_limit)
       call self%list_births(self%listed(:number), 0, pose%direction, schedule)
-      if (schedule%has_births) then
-         call solve_listed(self, self%listed(:number), schedule%birth_limit)
-      end if
+      if (schedule%has_births) call solve_listed(self, self%listed(:number), schedule%birth_limit)
       schedule%is_over = .false.
    end subroutine plan_steady
 
-   !> Solve where listed contacts will break that are born in a steady motion.
+   !> Replace the configured breaking stretches of contacts by their limits in the next life [m].
    subroutine solve_listed(self, contact, limit)
       class(ageing_contacts_type), intent(inout) :: self
-      !> Numbers of the contacts
       integer, intent(in) :: contact(:)
-      !> Their configured breaking stretches, and those at which they will break [m]
       real(wp), intent(inout) :: limit(:)
 
-      real(wp) :: stretch
       integer :: event
 
-      stretch = self%parameters%back_force_ratio * self%stretch
       do event = 1, size(contact)
          associate (next => self%next(:, contact(event)))
             next(next_configured) = limit(event)
             if (self%ageing%is_constant(limit(event), self%stretch)) cycle
             if (abs(next(next_speed) - self%speed) > 0.0_wp) then
-               next(next_limit) = meet(self%ageing, limit(event), self%stretch, 0.0_wp, stretch, &
-                  & self%speed)
+               next(next_limit) = newborn_limit(self, limit(event))
                next(next_speed) = self%speed
             end if
             limit(event) = next(next_limit)
@@ -231,10 +219,9 @@ contains
       end do
    end subroutine solve_listed
 
-   !> Keep the books of a schedule in a steady motion.
+   !> Update the contacts after a schedule in a steady motion.
    subroutine settle_steady(self, schedule)
       class(ageing_contacts_type), intent(inout) :: self
-      !> The schedule, as far as the slider came
       type(schedule_type), intent(in) :: schedule
 
       integer :: event, contact(max_events)
@@ -255,7 +242,7 @@ contains
             self%behind = max(self%behind, self%behind_at(one, schedule%attach_time(event)))
          end associate
       end do
-      ! Not before all are queued: what is known of one that is not would be of the life after it.
+      ! After all are queued, because that discards a solved next limit.
       do event = 1, schedule%attached
          if (self%life(life_motion, contact(event)) < any_motion) then
             call solve_later(self, contact(event))

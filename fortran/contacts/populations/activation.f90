@@ -67,7 +67,6 @@ contains
 
    !> Increase of levels in a motion.
    pure function growth(self, before, after)
-      !> How populations are activated
       class(activation_type), intent(in) :: self
       !> Pose of the slider before the motion, and after it
       type(pose_type), intent(in) :: before, after
@@ -96,7 +95,6 @@ contains
 
    !> Mean time of the hazard in a motion, over its duration.
    elemental function mean_time(self, start_force, end_force) result(time)
-      !> The increase
       class(growth_type), intent(in) :: self
       !> Forces on the contacts before and after
       real(wp), intent(in) :: start_force, end_force
@@ -110,7 +108,6 @@ contains
 
    !> Increase of the level of a population in a motion.
    elemental function added(self, growth, start_force, end_force) result(more)
-      !> How populations are activated
       class(activation_type), intent(in) :: self
       !> The increase
       type(growth_type), intent(in) :: growth
@@ -136,7 +133,6 @@ contains
 
    !> Level of a population after a motion.
    elemental function level_after(self, growth, level, start_force, end_force) result(after)
-      !> How populations are activated
       class(activation_type), intent(in) :: self
       !> The increase
       type(growth_type), intent(in) :: growth
@@ -156,7 +152,6 @@ contains
 
    !> Level of contacts that have attached a time ago.
    elemental function newborn_level(self, duration, force) result(level)
-      !> How populations are activated
       class(activation_type), intent(in) :: self
       !> The time [s], and the force on them
       real(wp), intent(in) :: duration, force

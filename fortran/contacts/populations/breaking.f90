@@ -71,7 +71,6 @@ contains
 
    !> Find what breaks until the slider comes to a displacement.
    subroutine try(self, before, displacement, time, direction, late, onset, error)
-      !> The populations
       class(breaking_populations_type), intent(inout) :: self
       !> Pose of the slider
       type(pose_type), intent(in) :: before
@@ -265,7 +264,6 @@ contains
 
    !> Make room for a trial of all populations.
    subroutine make_room_to_try(self, error)
-      !> The populations
       class(breaking_populations_type), intent(inout) :: self
       !> Set if there is not enough memory; the trial is empty then
       type(error_type), allocatable, intent(inout) :: error
@@ -337,7 +335,6 @@ contains
 
    !> Whether it is known what breaks until the slider is at a displacement at a time.
    pure function has_tried(self, displacement, time)
-      !> The populations
       class(breaking_populations_type), intent(in) :: self
       !> The displacement [m] and the time [s], on which it depends only if thresholds do
       real(wp), intent(in) :: displacement, time
@@ -350,7 +347,6 @@ contains
 
    !> Forget what was found to break.
    pure subroutine forget_trial(self)
-      !> The populations
       class(breaking_populations_type), intent(inout) :: self
 
       self%trial%count = 0
@@ -361,7 +357,6 @@ contains
 
    !> Break what was found to break.
    subroutine break_tried(self, break_loss)
-      !> The populations
       class(breaking_populations_type), intent(inout) :: self
       !> Elastic energy lost by breaking [J]
       type(accumulator_type), intent(inout) :: break_loss

@@ -70,7 +70,6 @@ contains
 
    !> Place nodes over the thresholds of a law.
    subroutine new_threshold_nodes(self, law, moments, ageing, width)
-      !> The nodes
       type(threshold_nodes_type), intent(out) :: self
       !> The law of configured thresholds
       class(threshold_law_type), intent(in) :: law
@@ -187,7 +186,6 @@ contains
 
    !> How many contacts are left.
    pure function left(self, broken, kept, number)
-      !> The nodes
       class(threshold_nodes_type), intent(in) :: self
       !> Configured threshold at or below which contacts broke at once
       real(wp), intent(in) :: broken
@@ -234,7 +232,6 @@ contains
 
    !> Fraction of the contacts of a population that survives a motion.
    subroutine pass(self, activation, growth, before, after, birth, force, broken, kept)
-      !> The nodes
       class(threshold_nodes_type), intent(in) :: self
       !> How contacts are activated, and what the motion adds to levels
       type(activation_type), intent(in) :: activation
@@ -269,7 +266,6 @@ contains
 
    !> Fraction of contacts that survives the time since they attached.
    subroutine pass_newborn(self, rate, duration, force, kept)
-      !> The nodes
       class(threshold_nodes_type), intent(in) :: self
       !> Rate of breaking at the threshold [1/s], the time [s], and the force on the contacts
       real(wp), intent(in) :: rate, duration, force

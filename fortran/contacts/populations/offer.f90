@@ -6,7 +6,7 @@
 !> shifted so that it does the true work. Chords of successive steps meet, so that the slider is not
 !> shaken. The steps are of second order.
 module mesoslip_contacts_populations_offer
-   use mesoslip_contacts_populations_activated_step, only: expect_motion, look_ahead_activated, &
+   use mesoslip_contacts_populations_thermal_step, only: expect_motion, look_ahead_thermal, &
       & max_growth, min_part, smooth_excess
    use mesoslip_contacts_populations_breaking, only: tiny_gap
    use mesoslip_contacts_populations_motion, only: distance_in, max_time, patience, &
@@ -38,7 +38,6 @@ contains
 
    !> Contact force as a law, and where it holds: until contacts break, or for a step.
    subroutine offer_step(self, pose, law, window)
-      !> The populations
       class(population_state_type), intent(inout) :: self
       !> Pose of the slider
       type(pose_type), intent(in) :: pose
@@ -54,14 +53,14 @@ contains
 
       expected = pose
       is_quiet = .false.
-      if (self%pinned%is_activated) call expect_motion(self, pose, expected, is_quiet)
+      if (self%pinned%is_thermal) call expect_motion(self, pose, expected, is_quiet)
       direction = expected%direction
       if (.not. abs(expected%velocity) > 0.0_wp .and. abs(expected%acceleration) > 0.0_wp) then
          direction = sign(1.0_wp, expected%acceleration)
       end if
       slack = tiny_gap * self%pinned%step
       if (is_quiet) slack = back_part * self%pinned%step
-      if (self%pinned%is_activated) then
+      if (self%pinned%is_thermal) then
          breaks = self%pinned%count > 0
       else if (direction > 0.0_wp) then
          breaks = self%pinned%ahead - pose%displacement <= slack
@@ -82,7 +81,7 @@ contains
       self%max_fall_time = huge(1.0_wp)
       if (self%pinned%some_fall) self%max_fall_time = time_to_fall(self, pose, span)
       max_span = min(max_span, self%max_fall_time)
-      if (self%pinned%is_activated .and. breaks) then
+      if (self%pinned%is_thermal .and. breaks) then
          ! As long as that a slider which hardly oscillates may settle.
          growing = max_growth * min(self%last_duration, max_time)
          if (is_quiet) growing = max(growing, settling_time / self%oscillation_rate(pose))
@@ -90,13 +89,13 @@ contains
       end if
       span = min(span, max_span)
       call self%detached%expect(pose%time, span, max_births, breaks .and. &
-         & (self%pinned%is_activated .or. distance_in(expected, direction, span) > 0.0_wp), births)
+         & (self%pinned%is_thermal .or. distance_in(expected, direction, span) > 0.0_wp), births)
       span = min(span, births%end_time - pose%time)
       distance = distance_in(expected, direction, span)
       reach = max(distance, min_part * self%pinned%step)
       limit = self%pinned%step
-      if (breaks .and. self%pinned%is_activated) then
-         call look_ahead_activated(self, expected, direction, max_births, span, distance, reach, &
+      if (breaks .and. self%pinned%is_thermal) then
+         call look_ahead_thermal(self, expected, direction, max_births, span, distance, reach, &
             & limit, births)
          max_span = span
       else if (breaks) then
@@ -130,7 +129,7 @@ contains
       law = self%law()
       self%detached_count = self%detached%number%total()
       if (moves) call add_changes(self, expected, direction, span, distance, births, law)
-      if (self%pinned%is_activated) call smooth_excess(self, window%end_time - pose%time, law)
+      if (self%pinned%is_thermal) call smooth_excess(self, window%end_time - pose%time, law)
       self%offered = law
       self%offers = .true.
    end subroutine offer_step
@@ -293,7 +292,7 @@ contains
       real(wp) :: noise
 
       is_balanced = .false.
-      if (self%pinned%is_activated .or. self%pinned%some_fall) return
+      if (self%pinned%is_thermal .or. self%pinned%some_fall) return
       noise = rounding * pose%inverse_mass * (abs(self%pinned%offset%total()) &
          & + abs(self%pinned%stiffness%total() * pose%displacement))
       is_balanced = noise > 0.0_wp .and. abs(pose%acceleration) <= noise &

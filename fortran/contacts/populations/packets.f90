@@ -84,7 +84,6 @@ contains
 
    !> Set up packets: none.
    subroutine new_detached_packets(self, parameters)
-      !> The packets
       type(detached_packets_type), intent(out) :: self
       !> Parameters of the contacts
       type(contact_parameters_type), intent(in) :: parameters
@@ -98,7 +97,6 @@ contains
 
    !> Take up contacts that broke evenly from one time to another.
    subroutine add(self, start_time, end_time, number, mass, error)
-      !> The packets
       class(detached_packets_type), intent(inout) :: self
       !> From when and until when they broke [s]
       real(wp), intent(in) :: start_time, end_time
@@ -146,7 +144,6 @@ contains
 
    !> Whether none waits to attach.
    pure function is_empty(self)
-      !> The packets
       class(detached_packets_type), intent(in) :: self
       !> Whether that is so
       logical :: is_empty
@@ -193,7 +190,6 @@ contains
 
    !> Contacts that will attach in a step, and how long it may last for that.
    subroutine expect(self, time, duration, max_births, breaks, births)
-      !> The packets
       class(detached_packets_type), intent(in) :: self
       !> When the step starts, and how long it will last if nothing ends it [s]
       real(wp), intent(in) :: time, duration
@@ -267,7 +263,6 @@ contains
 
    !> Take out all contacts that are due to attach.
    subroutine take_due(self, before, after, births, moment, when)
-      !> The packets
       class(detached_packets_type), intent(inout) :: self
       !> Pose of the slider before the motion, and after it
       type(pose_type), intent(in) :: before, after
@@ -310,7 +305,6 @@ contains
 
    !> Part of what breaks evenly in a step that attaches in it.
    elemental function own_part(self, duration) result(part)
-      !> The packets
       class(detached_packets_type), intent(in) :: self
       !> How long the step lasts [s]
       real(wp), intent(in) :: duration
@@ -379,7 +373,6 @@ contains
 
    !> Put the state into an archive or take it out.
    subroutine exchange(self, archive)
-      !> The packets
       class(detached_packets_type), intent(inout) :: self
       !> The archive
       type(archive_type), intent(inout) :: archive

@@ -5,7 +5,7 @@ module mesoslip_contacts_populations_pinned
    use mesoslip_contacts_mechanics, only: breaking_distance, broken_threshold, coupling_scaled, &
       & coupling_table, initial_steady, initial_uniform
    use mesoslip_contacts_partial_moments, only: new_partial_moments
-   use mesoslip_contacts_populations_activated, only: activated_populations_type, joining_part
+   use mesoslip_contacts_populations_thermal, only: thermal_populations_type, joining_part
    use mesoslip_contacts_populations_activation, only: new_activation
    use mesoslip_contacts_populations_breaking, only: unresolved_part
    use mesoslip_contacts_populations_rows, only: column_weight, compliant, moments_length, &
@@ -30,7 +30,7 @@ module mesoslip_contacts_populations_pinned
    real(wp), parameter :: reach = 6.0_wp
 
    !> Populations of pinned contacts.
-   type, extends(activated_populations_type) :: pinned_populations_type
+   type, extends(thermal_populations_type) :: pinned_populations_type
       !> Mean stiffness of a contact that attaches [N/m], and the energy it gains [J]
       real(wp) :: newborn_stiffness = 0.0_wp, newborn_energy = 0.0_wp
       !> Mean relative force of a contact that attaches
@@ -58,7 +58,6 @@ contains
 
    !> Set up populations: none.
    subroutine new_pinned_populations(self, parameters, resolution)
-      !> The populations
       type(pinned_populations_type), intent(out) :: self
       !> Parameters of the contacts
       type(contact_parameters_type), intent(in) :: parameters
@@ -112,7 +111,6 @@ contains
    !> Let contacts break by thermal activation, which spreads their breaking stretches too. If their
    !> thresholds change with age, that has been set before.
    subroutine activate(self, rate, width, resolution)
-      !> The populations, of equal contacts
       class(pinned_populations_type), intent(inout) :: self
       !> Rate of breaking at the threshold [1/s], f_T/f_s, and length of a step over the spread
       real(wp), intent(in) :: rate, width, resolution
@@ -171,7 +169,6 @@ contains
 
    !> Let thresholds change with age.
    subroutine set_ageing(self, ageing)
-      !> The populations
       class(pinned_populations_type), intent(inout) :: self
       !> How they change
       type(ageing_law_type), intent(in) :: ageing
@@ -184,7 +181,6 @@ contains
 
    !> Prepare the populations for the start of a run.
    subroutine initialize(self, state, error)
-      !> The populations
       class(pinned_populations_type), intent(inout) :: self
       !> One of the initial_ codes
       integer, intent(in) :: state
@@ -220,7 +216,6 @@ contains
 
    !> Add contacts that attached with one force, as many in each displacement.
    subroutine add_sliding(self, force, share, moments, broken, error)
-      !> The populations
       class(pinned_populations_type), intent(inout) :: self
       !> Relative force at attaching, and relative number of contacts
       real(wp), intent(in) :: force, share
@@ -258,7 +253,6 @@ contains
 
    !> Attach contacts as one population for each force, where they do on average.
    subroutine attach(self, births, moment, direction, displacement, birth, time, lost, error)
-      !> The populations
       class(pinned_populations_type), intent(inout) :: self
       !> How many they are, the sum of their displacements [m], and the direction of their forces
       real(wp), intent(in) :: births, moment, direction
@@ -280,7 +274,7 @@ contains
       lost = 0.0_wp
       origin = moment / births
       joins = .false.
-      if (self%is_activated) joins = self%may_join_last(origin, birth, direction)
+      if (self%is_thermal) joins = self%may_join_last(origin, birth, direction)
       do class = 1, self%classes
          force = direction * self%class_force(class)
          mean_force = force + 0.5_wp * (displacement - origin) / self%stretch
@@ -292,7 +286,7 @@ contains
                & self%law_of(class, direction), self%class_broken(class), displacement, birth, &
                & time, error)
             if (allocated(error)) return
-            if (self%is_activated) call self%begin_hazard(self%count, time - birth, mean_force)
+            if (self%is_thermal) call self%begin_hazard(self%count, time - birth, mean_force)
          end if
       end do
       if (joins) return

@@ -19,7 +19,6 @@ contains
 
    !> Break and attach contacts after a motion of the slider.
    subroutine respond_to_motion(self, before, after)
-      !> The populations
       class(population_state_type), intent(inout) :: self
       !> Pose of the slider before the motion, and after it
       type(pose_type), intent(in) :: before, after
@@ -29,22 +28,22 @@ contains
 
       start = before
       end = after
-      if (self%pinned%is_activated) call straighten(self, start, end)
+      if (self%pinned%is_thermal) call straighten(self, start, end)
       if (self%offers) call add_step_work(self, start, end)
-      if (self%pinned%is_activated) then
-         call try_activated(self, start, end, has_broken)
+      if (self%pinned%is_thermal) then
+         call try_thermal(self, start, end, has_broken)
       else
          call try_to_break(self, start, end, has_broken)
       end if
       if (has_broken) call detach_tried(self, before, after)
       if (.not. self%detached%is_empty()) call attach_due(self, start, end)
       if (self%pinned%ages) call self%pinned%update_thresholds(after%displacement, after%time)
-      if (self%pinned%some_fall .and. .not. self%pinned%is_activated) then
+      if (self%pinned%some_fall .and. .not. self%pinned%is_thermal) then
          call break_fallen(self, before, after)
       end if
       self%detached_count = self%detached%number%total()
       self%cost = 1.0_wp + self%pinned%count / populations_per_cost
-      if (self%pinned%is_activated) call note_step(self, before, after)
+      if (self%pinned%is_thermal) call note_step(self, before, after)
       self%offers = .false.
    end subroutine respond_to_motion
 
@@ -116,7 +115,7 @@ contains
    end subroutine try_to_break
 
    !> Find what breaks of contacts that break by activation.
-   subroutine try_activated(self, before, after, has_broken)
+   subroutine try_thermal(self, before, after, has_broken)
       class(population_state_type), intent(inout) :: self
       type(pose_type), intent(in) :: before, after
       !> Whether contacts break
@@ -128,7 +127,7 @@ contains
          & .or. abs(after%displacement - before%displacement) > 0.0_wp)
       if (has_broken) call self%pinned%try_motion(before, after, after%displacement, late, onset, &
          & self%failure)
-   end subroutine try_activated
+   end subroutine try_thermal
 
    !> Take a motion as even in which the slider may have oscillated many times, by next to nothing.
    pure subroutine straighten(self, before, after)

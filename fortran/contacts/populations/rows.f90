@@ -124,7 +124,6 @@ contains
 
    !> Set up rows: none.
    subroutine new_population_rows(self, parameters)
-      !> The populations
       class(population_rows_type), intent(inout) :: self
       !> Parameters of the contacts
       type(contact_parameters_type), intent(in) :: parameters
@@ -254,7 +253,6 @@ contains
 
    !> Find again where populations break next, as their thresholds have changed.
    subroutine update_thresholds(self, displacement, time)
-      !> The populations
       class(population_rows_type), intent(inout) :: self
       !> Displacement of the slider [m], and time [s]
       real(wp), intent(in) :: displacement, time
@@ -299,7 +297,6 @@ contains
 
    !> Move the origin of displacements.
    subroutine shift_origin(self, shift)
-      !> The populations
       class(population_rows_type), intent(inout) :: self
       !> Displacement of the new origin [m]
       real(wp), intent(in) :: shift
@@ -315,7 +312,6 @@ contains
 
    !> Number of contacts.
    pure function number_of_contacts(self) result(total)
-      !> The populations
       class(population_rows_type), intent(in) :: self
       !> Their number, in the mean of what it may be
       real(wp) :: total
@@ -325,7 +321,6 @@ contains
 
    !> Elastic energy of the contacts.
    pure function elastic_energy(self, displacement) result(energy)
-      !> The populations
       class(population_rows_type), intent(in) :: self
       !> Displacement of the slider [m]
       real(wp), intent(in) :: displacement
@@ -349,7 +344,6 @@ contains
 
    !> Put the state into an archive or take it out.
    subroutine exchange(self, archive)
-      !> The populations
       class(population_rows_type), intent(inout) :: self
       !> The archive
       type(archive_type), intent(inout) :: archive

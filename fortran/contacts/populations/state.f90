@@ -37,11 +37,8 @@ module mesoslip_contacts_populations_state
 
 contains
 
-   !> Contact force as a law, for a slider that does not move.
    pure function law(self)
-      !> The populations
       class(population_state_type), intent(in) :: self
-      !> The law
       type(interface_law_type) :: law
 
       law%stiffness = self%pinned%stiffness%total()
@@ -51,7 +48,6 @@ contains
 
    !> Rate at which the slider oscillates or is damped on the contacts [1/s].
    pure function oscillation_rate(self, pose) result(rate)
-      !> The populations
       class(population_state_type), intent(in) :: self
       !> Pose of the slider
       type(pose_type), intent(in) :: pose

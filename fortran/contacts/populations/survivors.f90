@@ -84,7 +84,6 @@ contains
 
    !> Tabulate what activation leaves of contacts of a law.
    subroutine new_survivors(self, law, moments, order, width)
-      !> The survivors
       type(survivors_type), intent(out) :: self
       !> The law
       class(threshold_law_type), intent(in) :: law
@@ -340,7 +339,6 @@ contains
 
    !> How many contacts are left.
    pure function left(self, broken, level, number)
-      !> The survivors
       class(survivors_type), intent(in) :: self
       !> Threshold at or below which contacts broke at once, and the level
       real(wp), intent(in) :: broken, level

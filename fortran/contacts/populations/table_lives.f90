@@ -54,7 +54,6 @@ contains
 
    !> Set up what is left of the contacts of a table.
    subroutine new_table_lives(self, cells, mean_square, force)
-      !> The lives
       type(table_lives_type), intent(out) :: self
       !> The table
       type(stretch_cells_type), intent(in) :: cells
@@ -113,7 +112,6 @@ contains
 
    !> Distance after which the first contacts of a law break.
    pure function shortest(self, law, direction) result(distance)
-      !> The lives
       class(table_lives_type), intent(in) :: self
       !> The law, and the direction
       integer, intent(in) :: law
@@ -126,7 +124,6 @@ contains
 
    !> Distance after which the last contacts of a law break, forward.
    pure function longest(self, law) result(distance)
-      !> The lives
       class(table_lives_type), intent(in) :: self
       !> The law
       integer, intent(in) :: law
@@ -138,7 +135,6 @@ contains
 
    !> Distance in one direction up to which none breaks of what is left after one in the other.
    pure function min_opposite(self, law, direction, distance) result(opposite_distance)
-      !> The lives
       class(table_lives_type), intent(in) :: self
       !> The law, and the direction in which contacts broke
       integer, intent(in) :: law
@@ -158,7 +154,6 @@ contains
 
    !> Surviving fraction of a population.
    pure subroutine left(self, law, ahead, behind, moments)
-      !> The lives
       class(table_lives_type), intent(in) :: self
       !> Its law
       integer, intent(in) :: law

@@ -5,24 +5,24 @@ Adding a kind is adding a file with a `ContactKind` and naming it in `KINDS`.
 
 from __future__ import annotations
 
-from mesoslip.configuration.contacts.activated import (
-    ActivatedAgeingContacts,
-    ActivatedAgeingPopulations,
-    ActivatedContacts,
-    ActivatedPopulations,
-)
 from mesoslip.configuration.contacts.ageing import AgeingContacts, AgeingPopulations
 from mesoslip.configuration.contacts.base import COMMON_KEYS, ContactKind
 from mesoslip.configuration.contacts.ensemble import EnsembleContacts
 from mesoslip.configuration.contacts.lattice import LatticeContacts
 from mesoslip.configuration.contacts.populations import PopulationContacts
 from mesoslip.configuration.contacts.tables import Interaction
+from mesoslip.configuration.contacts.thermal import (
+    ThermalAgeingContacts,
+    ThermalAgeingPopulations,
+    ThermalContacts,
+    ThermalPopulations,
+)
 
 KINDS: tuple[type[ContactKind], ...] = (
-    ActivatedAgeingContacts,
-    ActivatedAgeingPopulations,
-    ActivatedContacts,
-    ActivatedPopulations,
+    ThermalAgeingContacts,
+    ThermalAgeingPopulations,
+    ThermalContacts,
+    ThermalPopulations,
     AgeingContacts,
     AgeingPopulations,
     EnsembleContacts,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mesoslip.configuration.contacts.activated import thermal_of
+from mesoslip.configuration.contacts.thermal import thermal_of
 from mesoslip.errors import MesoslipError
 from mesoslip.theory.contacts.thermal_sliding import RateAndStateTheory
 from mesoslip.theory.delays import mean_delay

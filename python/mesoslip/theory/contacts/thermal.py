@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mesoslip.configuration.contacts.activated import thermal_of
+from mesoslip.configuration.contacts.thermal import thermal_of
 from mesoslip.errors import ConfigError, Problem
 from mesoslip.theory.contacts.base import ContactTheory
 from mesoslip.theory.contacts.thermal_lives import ThermalAgeingLives, ThermalLives

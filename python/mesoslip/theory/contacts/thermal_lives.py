@@ -19,8 +19,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mesoslip.configuration.contacts.activated import thermal_of
 from mesoslip.configuration.contacts.ageing import ageing_of
+from mesoslip.configuration.contacts.thermal import thermal_of
 from mesoslip.theory.contacts import ageing_lives
 from mesoslip.theory.contacts.steady import check_steady
 from mesoslip.theory.delays import drag_impulse, mean_delay

@@ -37,7 +37,7 @@ def thermal_parameters(config: Setting) -> Parameters:
 
 
 def thermal_problems(config: Setting) -> Complaints:
-    """Combinations that activated contacts refuse, in both engines."""
+    """Combinations that thermally activated contacts refuse, in both engines."""
     contacts, thermal = config.contacts, thermal_of(config)
     if contacts.coupling != "equal":
         yield Complaint(
@@ -83,10 +83,10 @@ def _idle_life(contacts: Contacts, thermal: Thermal, duration: float) -> float:
     return float(np.sum(steps * np.exp(-hazard[:-1]) * share))
 
 
-class ActivatedContacts(ContactKind):
+class ThermalContacts(ContactKind):
     """Independent contacts that break by thermal activation, simulated one by one."""
 
-    kernel_kind: ClassVar[str] = "activated"
+    kernel_kind: ClassVar[str] = "thermal"
     engine: ClassVar[str] = "eq"
     features: ClassVar[frozenset[str]] = frozenset({"contacts.thermal"})
 
@@ -110,10 +110,10 @@ class ActivatedContacts(ContactKind):
         yield from thermal_problems(config)
 
 
-class ActivatedAgeingContacts(ActivatedContacts):
+class ThermalAgeingContacts(ThermalContacts):
     """The same contacts with thresholds that change with age."""
 
-    kernel_kind: ClassVar[str] = "activated ageing"
+    kernel_kind: ClassVar[str] = "thermal ageing"
     features: ClassVar[frozenset[str]] = frozenset({"contacts.thermal", "contacts.ageing"})
     # A contact whose threshold moves breaks within a tiny gap of it.
     force_error_bound: ClassVar[float] = 1e-9
@@ -126,10 +126,10 @@ class ActivatedAgeingContacts(ActivatedContacts):
         yield from age_problems(config)
 
 
-class ActivatedPopulations(PopulationContacts):
+class ThermalPopulations(PopulationContacts):
     """Infinitely many contacts that break by thermal activation."""
 
-    kernel_kind: ClassVar[str] = "activated populations"
+    kernel_kind: ClassVar[str] = "thermal populations"
     features: ClassVar[frozenset[str]] = frozenset({"contacts.thermal"})
     # A slider that hardly oscillates is taken to creep: what energy it oscillates with is lost.
     residual_bound: ClassVar[float] = 1e-5
@@ -150,10 +150,10 @@ class ActivatedPopulations(PopulationContacts):
             )
 
 
-class ActivatedAgeingPopulations(ActivatedPopulations):
+class ThermalAgeingPopulations(ThermalPopulations):
     """Infinitely many contacts that break by thermal activation and age."""
 
-    kernel_kind: ClassVar[str] = "activated ageing populations"
+    kernel_kind: ClassVar[str] = "thermal ageing populations"
     features: ClassVar[frozenset[str]] = frozenset({"contacts.thermal", "contacts.ageing"})
 
     def kernel_parameters(self, config: Setting) -> Parameters:

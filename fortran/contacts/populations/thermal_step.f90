@@ -2,7 +2,7 @@
 !>
 !> In a step only a small part of the contacts breaks by activation. A slider that hardly oscillates
 !> is taken to creep on as in the step before: the step may then be as long as what breaks allows.
-module mesoslip_contacts_populations_activated_step
+module mesoslip_contacts_populations_thermal_step
    use mesoslip_contacts_populations_motion, only: distance_in, time_to_move
    use mesoslip_contacts_populations_packets, only: expected_births_type
    use mesoslip_contacts_populations_state, only: population_state_type
@@ -11,7 +11,7 @@ module mesoslip_contacts_populations_activated_step
    implicit none
    private
 
-   public :: expect_motion, look_ahead_activated, max_growth, min_part, quiet_force, smooth_excess
+   public :: expect_motion, look_ahead_thermal, max_growth, min_part, quiet_force, smooth_excess
 
    !> Force of an oscillation that counts as none, over f_T of all contacts and at resolution 1
    real(wp), parameter :: quiet_part = 1.0e-2_wp
@@ -30,7 +30,6 @@ contains
 
    !> Force of an oscillation that counts as none [N].
    pure function quiet_force(self) result(force)
-      !> The populations
       class(population_state_type), intent(in) :: self
       !> The force
       real(wp) :: force
@@ -43,7 +42,6 @@ contains
 
    !> The motion that is expected: even, as in the step before, of a slider that hardly oscillates.
    subroutine expect_motion(self, pose, expected, is_quiet)
-      !> The populations
       class(population_state_type), intent(in) :: self
       !> Pose of the slider
       type(pose_type), intent(in) :: pose
@@ -66,9 +64,8 @@ contains
    end subroutine expect_motion
 
    !> Find what breaks in a step, and what of that attaches in it; the step may become shorter.
-   subroutine look_ahead_activated(self, pose, direction, max_births, span, distance, reach, &
+   subroutine look_ahead_thermal(self, pose, direction, max_births, span, distance, reach, &
       & limit, births)
-      !> The populations
       class(population_state_type), intent(inout) :: self
       !> Pose of the slider, and its expected motion
       type(pose_type), intent(in) :: pose
@@ -146,12 +143,11 @@ contains
          distance = distance_in(pose, direction, span)
       end subroutine shorten
 
-   end subroutine look_ahead_activated
+   end subroutine look_ahead_thermal
 
    !> Let the offered force go on from that of the step before, and come to that of the contacts at
    !> the end of the step: a jump would shake the slider.
    pure subroutine smooth_excess(self, span, law)
-      !> The populations
       class(population_state_type), intent(in) :: self
       !> Duration of the step [s]
       real(wp), intent(in) :: span
@@ -164,4 +160,4 @@ contains
       law%rate = law%rate - self%excess / span
    end subroutine smooth_excess
 
-end module mesoslip_contacts_populations_activated_step
+end module mesoslip_contacts_populations_thermal_step

@@ -1,18 +1,18 @@
 !> Contacts that break by thermal activation under a slider whose motion is prescribed and uniform.
 !>
 !> At the constant velocity v the hazard of a contact under positive force is a function of its
-!> stretch alone: from the stretch a to the stretch x it grows by
-!> omega_0 f_T/(k v) exp(-f_s/f_T) (exp(k x/f_T) - exp(k a/f_T)). So it is known at birth at which
-!> stretch it has grown to the deviate of the contact, which then breaks there, or at its threshold
-!> if that comes first, as a contact without temperature does. No clock is needed, and schedules are
-!> those of contacts without temperature. Under negative force the same holds for the stretch of the
-!> other sign. When the velocity changes, what is left of the deviates goes on with the clocks.
-module mesoslip_contacts_activated_steady
-   use mesoslip_contacts_activated_keys, only: life_clock, life_key, life_left, life_next, motions
-   use mesoslip_contacts_activated_lists, only: activated_lists_type, set_up_lists
+!> stretch: from the stretch a to the stretch x it grows by
+!> omega_0 f_T/(k v) exp(-f_s/f_T) (exp(k x/f_T) - exp(k a/f_T)). At birth the stretch is solved at
+!> which it reaches the deviate of the contact. The contact breaks there or at its threshold, as one
+!> without temperature, and schedules have no clocks. Under negative force the same holds for the
+!> stretch of the other sign. When the velocity changes, the remaining deviates continue with the
+!> clocks.
+module mesoslip_contacts_thermal_steady
    use mesoslip_contacts_individual_births, only: drag_of
    use mesoslip_contacts_individual_record, only: row_limit, row_origin, row_stiffness
-   use mesoslip_interface_law, only: clocks, pose_type
+   use mesoslip_contacts_thermal_keys, only: life_clock, life_key, life_left, life_next, set_up_keys
+   use mesoslip_contacts_thermal_lists, only: thermal_lists_type
+   use mesoslip_interface_law, only: pose_type
    use mesoslip_numerics_errors, only: error_type, raise, status_memory
    use mesoslip_numerics_kinds, only: i8, wp
    use mesoslip_numerics_parameters, only: parameters_type
@@ -20,58 +20,47 @@ module mesoslip_contacts_activated_steady
    implicit none
    private
 
-   public :: activated_steady_type, set_up_steady
+   public :: thermal_steady_type, set_up_steady
 
-   !> Minimum velocity, over that at which a threshold force is passed by f_T in the time 1/omega_0:
-   !> the displacement of a slower slider does not resolve the time to rounding
+   !> Minimum velocity, over f_T/k times omega_0: the displacement of a slower slider does not
+   !> resolve the time to rounding
    real(wp), parameter :: min_velocity_ratio = 1.0e-6_wp
-   !> Position of the stretch at the threshold in the numbers of a next life, and of that at which
-   !> the deviate is used up
+   !> Numbers of a next life: stretch at the threshold, and stretch at which the deviate is used up
    integer, parameter :: next_limit = 1, next_key = 2, next_length = 2
 
-   !> Activated contacts whose breaking displacements are known in advance if the motion is uniform.
-   type, abstract, extends(activated_lists_type) :: activated_steady_type
+   !> Contacts whose breaking displacements are known in advance if the motion is uniform.
+   type, abstract, extends(thermal_lists_type) :: thermal_steady_type
       !> Contacts of the schedule that break
       integer, private :: steady_listed(max_events) = 0
       !> Numbers of the next lives of contacts of the schedule, shape (next_length, count)
       real(wp), allocatable, private :: next(:, :)
    contains
-      !> See whether the motion is uniform now
-      procedure, non_overridable :: follow_motion
-      !> Break the contacts that are due in a uniform motion
-      procedure, non_overridable :: find_due
-      !> Put a contact that attached in a uniform motion into the order of breaking
-      procedure, non_overridable :: join_steadily
-      !> Write a schedule of a uniform motion, and keep the books of it
-      procedure, non_overridable :: plan_steadily, settle_steadily
-      procedure, non_overridable, private :: begin_steady, end_steady, breaking_stretch, &
-         & list_next
-   end type activated_steady_type
+      procedure, non_overridable :: follow_motion, join_steadily, plan_steadily, settle_steadily
+      procedure, non_overridable, private :: begin_steady, end_steady, breaking_stretch, list_next
+   end type thermal_steady_type
 
 contains
 
-   !> Set up contacts whose breaking displacements are known in a uniform motion.
+   !> Set up contacts that write schedules, with common parameters, from the other numbers.
    subroutine set_up_steady(self, parameters, error)
-      !> The contacts, of which is known what is common to all kinds
-      class(activated_steady_type), intent(inout) :: self
-      !> The other numbers: columns and rows, rate and force of activation
+      class(thermal_steady_type), intent(inout) :: self
       type(parameters_type), intent(inout) :: parameters
-      !> Set if a number is missing or wrong, or there is not enough memory
       type(error_type), allocatable, intent(inout) :: error
 
       integer :: stat
 
-      call set_up_lists(self, parameters, error)
+      call set_up_keys(self, parameters, error)
       if (allocated(error)) return
-      allocate (self%next(next_length, self%parameters%count), source=0.0_wp, stat=stat)
-      if (stat /= 0) call raise(error, status_memory, "not enough memory for lives of contacts")
+      allocate (self%entry(self%parameters%count), source=0, stat=stat)
+      if (stat == 0) then
+         allocate (self%next(next_length, self%parameters%count), source=0.0_wp, stat=stat)
+      end if
+      if (stat /= 0) call raise(error, status_memory, "not enough memory for lists of contacts")
    end subroutine set_up_steady
 
-   !> See whether the motion is uniform now, and to it that contacts are ordered for that.
+   !> Order the contacts for the present motion of the slider, uniform or not.
    subroutine follow_motion(self, pose)
-      !> The contacts
-      class(activated_steady_type), intent(inout) :: self
-      !> Pose of the slider
+      class(thermal_steady_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
 
       logical :: is_steady
@@ -85,9 +74,9 @@ contains
       if (is_steady) call self%begin_steady(pose)
    end subroutine follow_motion
 
-   !> Order contacts by where they break in a uniform motion.
+   !> Order contacts by where they break in the uniform motion.
    subroutine begin_steady(self, pose)
-      class(activated_steady_type), intent(inout) :: self
+      class(thermal_steady_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
 
       integer :: contact
@@ -97,7 +86,7 @@ contains
       self%direction = sign(1.0_wp, pose%velocity)
       do contact = 1, self%parameters%count
          if (.not. self%record(row_stiffness, contact) > 0.0_wp) cycle
-         call self%settle_deviate(contact)
+         call self%update_deviate(contact)
          self%life(life_key, contact) = self%breaking_stretch(self%record(row_limit, contact), &
             & self%direction * (pose%displacement - self%record(row_origin, contact)), &
             & self%life(life_left, contact))
@@ -105,22 +94,17 @@ contains
       call self%rebuild(pose%displacement)
    end subroutine begin_steady
 
-   !> Order contacts by the clocks again: what is left of their deviates follows from the distance
-   !> to where they would break.
+   !> Order contacts by the clocks again. Their remaining deviates follow from the distances to
+   !> where they would break.
    subroutine end_steady(self, pose)
-      class(activated_steady_type), intent(inout) :: self
+      class(thermal_steady_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
 
       real(wp) :: stretch, growth
       integer :: contact
 
       self%is_steady = .false.
-      do contact = 1, clocks
-         call self%order(contact)%clear()
-         call self%order(motions + contact)%clear()
-      end do
-      self%ahead = merge(1, 2, self%direction > 0.0_wp)
-      self%members = 0
+      call self%clear_orders()
       self%behind = -huge(1.0_wp)
       self%hazard%reference = pose%displacement
       self%hazard%reading = 0.0_wp
@@ -140,26 +124,23 @@ contains
       end do
    end subroutine end_steady
 
-   !> Hazard from no force to a stretch, negative for negative ones, in units of
-   !> omega_0 f_T/(k v).
+   !> Hazard from zero stretch to a stretch, in units of omega_0 f_T/(k v), with the sign of the
+   !> stretch; slope is k/f_T, and limit the stretch at the threshold.
    pure function grown(slope, limit, stretch)
-      !> One over the stretch that belongs to f_T [1/m], stretch at the threshold and stretch [m]
       real(wp), intent(in) :: slope, limit, stretch
       real(wp) :: grown
 
       grown = sign(exp(slope * (abs(stretch) - limit)) - exp(-slope * limit), stretch)
    end function grown
 
-   !> Stretch at which the hazard of a contact has grown to its deviate.
+   !> Stretch at which the hazard of a contact reaches its remaining deviate, given the stretch at
+   !> the threshold and the present stretch along the motion [m].
    pure function breaking_stretch(self, limit, stretch, left) result(breaking)
-      class(activated_steady_type), intent(in) :: self
-      !> Stretch at the threshold, and now, along the motion [m]
-      real(wp), intent(in) :: limit, stretch
-      !> Remaining deviate
-      real(wp), intent(in) :: left
+      class(thermal_steady_type), intent(in) :: self
+      real(wp), intent(in) :: limit, stretch, left
       real(wp) :: breaking
 
-      real(wp) :: wanted, none
+      real(wp) :: wanted
 
       associate (slope => self%hazard%slope)
          wanted = left * (slope * abs(self%velocity) / self%hazard%rate)
@@ -168,55 +149,36 @@ contains
             breaking = limit + log(max(wanted, tiny(1.0_wp))) / slope
             return
          end if
-         none = exp(-slope * limit)
          wanted = wanted + grown(slope, limit, stretch)
-         breaking = sign(limit + log(max(abs(wanted) + none, tiny(1.0_wp))) / slope, wanted)
+         breaking = sign(limit + log(max(abs(wanted) + exp(-slope * limit), tiny(1.0_wp))) &
+            & / slope, wanted)
       end associate
    end function breaking_stretch
 
-   !> Find a contact that is due in a uniform motion.
-   subroutine find_due(self, pose, contact)
-      !> The contacts
-      class(activated_steady_type), intent(inout) :: self
-      !> Pose of the slider
-      type(pose_type), intent(in) :: pose
-      !> Number of the contact, 0 if none is due
-      integer, intent(out) :: contact
-
-      call self%order(self%ahead)%due(self%direction * pose%displacement, contact)
-   end subroutine find_due
-
-   !> Put a contact that has attached in a uniform motion into the order of breaking.
+   !> Insert a contact that has attached in a uniform motion.
    subroutine join_steadily(self, contact, pose)
-      !> The contacts
-      class(activated_steady_type), intent(inout) :: self
-      !> Number of the contact, of which the deviate is known
+      class(thermal_steady_type), intent(inout) :: self
       integer, intent(in) :: contact
-      !> Pose of the slider
       type(pose_type), intent(in) :: pose
 
       real(wp) :: stretch
 
       stretch = pose%displacement - self%record(row_origin, contact)
-      ! The same as in a schedule, to the last digit.
+      ! To the last digit as in a schedule.
       if (.not. allocated(self%births%force)) stretch = pose%direction &
          & * self%parameters%back_force_ratio * self%parameters%static_force &
          & / self%record(row_stiffness, contact)
       self%life(life_clock, contact) = merge(1.0_wp, 2.0_wp, self%direction > 0.0_wp)
       self%life(life_key, contact) = self%breaking_stretch(self%record(row_limit, contact), &
          & self%direction * stretch, self%life(life_left, contact))
-      call self%place(contact)
+      call self%insert(contact)
    end subroutine join_steadily
 
    !> Write a schedule of a uniform motion: the next breaks, and about as many attachments.
    subroutine plan_steadily(self, pose, limit, schedule)
-      !> The contacts
-      class(activated_steady_type), intent(inout) :: self
-      !> Pose of the slider
+      class(thermal_steady_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
-      !> Maximum number of breaks, and of attachments
       integer, intent(in) :: limit
-      !> The schedule; at its end if there is none
       type(schedule_type), intent(inout) :: schedule
 
       integer :: number, event, contact(max_events)
@@ -251,14 +213,12 @@ contains
       schedule%is_over = .false.
    end subroutine plan_steadily
 
-   !> List where contacts will break that are born in a uniform motion.
+   !> Solve where contacts with drawn deviates break that attach in a uniform motion with a stretch
+   !> [m]; limit is the stretch at the threshold, on return that at breaking [m].
    subroutine list_next(self, contact, stretch, limit)
-      class(activated_steady_type), intent(inout) :: self
-      !> Numbers of the contacts, of which the deviates are known
+      class(thermal_steady_type), intent(inout) :: self
       integer, intent(in) :: contact(:)
-      !> Stretches when they attach [m]
       real(wp), intent(in) :: stretch(:)
-      !> Stretches at their thresholds, then those at which they break [m]
       real(wp), intent(inout) :: limit(:)
 
       real(wp) :: breaking
@@ -272,11 +232,9 @@ contains
       end do
    end subroutine list_next
 
-   !> Keep the books of a schedule of a uniform motion.
+   !> Update the contacts after a schedule of a uniform motion.
    subroutine settle_steadily(self, schedule)
-      !> The contacts
-      class(activated_steady_type), intent(inout) :: self
-      !> The schedule, as far as the slider came
+      class(thermal_steady_type), intent(inout) :: self
       type(schedule_type), intent(in) :: schedule
 
       real(wp) :: key
@@ -292,15 +250,15 @@ contains
          associate (contact => attached(event))
             self%record(row_limit, contact) = self%next(next_limit, contact)
             key = self%next(next_key, contact)
-            ! As for a contact that attaches outside a schedule, the force of which is not known.
+            ! As for a contact that attaches outside a schedule, whose force is not known before.
             if (allocated(self%births%force)) key = self%breaking_stretch(self%next(next_limit, &
                & contact), self%direction * (schedule%attach_displacement(event) &
                & - self%record(row_origin, contact)), self%life(life_next, contact))
             self%life(:, contact) = [merge(1.0_wp, 2.0_wp, self%direction > 0.0_wp), 0.0_wp, &
                & key, 0.0_wp]
-            call self%place(contact)
+            call self%insert(contact)
          end associate
       end do
    end subroutine settle_steadily
 
-end module mesoslip_contacts_activated_steady
+end module mesoslip_contacts_thermal_steady

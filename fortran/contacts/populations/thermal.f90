@@ -4,7 +4,7 @@
 !> maximum force on it and the level of its hazard, so that it does not depend on steps. Of what
 !> breaks in a step, the contacts that come to their thresholds go with the displacement of the
 !> slider, the others with the time.
-module mesoslip_contacts_populations_activated
+module mesoslip_contacts_populations_thermal
    use mesoslip_contacts_populations_activation, only: activation_type, growth_type
    use mesoslip_contacts_populations_breaking, only: breaking_populations_type, tiny_gap, &
       & trial_type, unresolved_part
@@ -20,7 +20,7 @@ module mesoslip_contacts_populations_activated
    implicit none
    private
 
-   public :: activated_populations_type, joining_part
+   public :: thermal_populations_type, joining_part
 
    !> Part of a population that has broken, beyond which no contacts join it any more
    real(wp), parameter :: max_joined_loss = 0.01_wp
@@ -31,9 +31,9 @@ module mesoslip_contacts_populations_activated
    real(wp), parameter :: max_exponent = 700.0_wp
 
    !> Pinned populations of which contacts may break by thermal activation.
-   type, extends(breaking_populations_type) :: activated_populations_type
+   type, extends(breaking_populations_type) :: thermal_populations_type
       !> Whether they do, and how
-      logical :: is_activated = .false.
+      logical :: is_thermal = .false.
       type(activation_type) :: activation
       !> Fraction of contacts that survives it, and of those whose thresholds change with age
       type(survivors_type), private :: survivors
@@ -53,20 +53,19 @@ module mesoslip_contacts_populations_activated
       procedure, non_overridable :: begin_hazard
       procedure, non_overridable, private :: break_one, number_left, thresholds_reached, &
          & first_break_force
-   end type activated_populations_type
+   end type thermal_populations_type
 
 contains
 
    !> Let contacts break by activation.
    subroutine set_activation(self, activation, resolution)
-      !> The populations
-      class(activated_populations_type), intent(inout) :: self
+      class(thermal_populations_type), intent(inout) :: self
       !> How they do
       type(activation_type), intent(in) :: activation
       !> Length of a step over the spread of the breaking stretches
       real(wp), intent(in) :: resolution
 
-      self%is_activated = .true.
+      self%is_thermal = .true.
       self%keeps_order = .true.
       self%activation = activation
       if (self%ages) then
@@ -82,8 +81,7 @@ contains
 
    !> Find what breaks in a motion of the slider.
    subroutine try_motion(self, before, after, displacement, late, onset, error)
-      !> The populations
-      class(activated_populations_type), intent(inout) :: self
+      class(thermal_populations_type), intent(inout) :: self
       !> Pose of the slider, and where it comes to
       type(pose_type), intent(in) :: before, after
       !> Displacement until which contacts are found that come to their thresholds, not less far [m]
@@ -172,7 +170,7 @@ contains
 
    !> Find what breaks of a population.
    subroutine break_one(self, row, growth, before, after, forces, cut, left)
-      class(activated_populations_type), intent(inout) :: self
+      class(thermal_populations_type), intent(inout) :: self
       !> Which one, and what the motion adds to levels
       integer, intent(in) :: row
       type(growth_type), intent(in) :: growth
@@ -221,7 +219,7 @@ contains
 
    !> Configured threshold of the contacts of a population whose thresholds are reached.
    pure function thresholds_reached(self, row, force, time) result(threshold)
-      class(activated_populations_type), intent(in) :: self
+      class(thermal_populations_type), intent(in) :: self
       integer, intent(in) :: row
       !> Force on the contacts, and when that is [s]
       real(wp), intent(in) :: force, time
@@ -234,7 +232,7 @@ contains
 
    !> Force along the direction at which the first contacts of a population reach their thresholds.
    pure function first_break_force(self, row, before, start, last) result(force)
-      class(activated_populations_type), intent(in) :: self
+      class(thermal_populations_type), intent(in) :: self
       integer, intent(in) :: row
       type(pose_type), intent(in) :: before
       !> Forces before the motion and at its end
@@ -255,7 +253,7 @@ contains
 
    !> Surviving contacts of a population over its weight.
    pure function number_left(self, row) result(left)
-      class(activated_populations_type), intent(in) :: self
+      class(thermal_populations_type), intent(in) :: self
       integer, intent(in) :: row
       real(wp) :: left
 
@@ -293,8 +291,7 @@ contains
 
    !> Whether contacts may join a population: hardly any of it have broken, and it is not older.
    pure function may_join(self, row, birth)
-      !> The populations
-      class(activated_populations_type), intent(in) :: self
+      class(thermal_populations_type), intent(in) :: self
       !> Which one, and when the contacts attached [s]
       integer, intent(in) :: row
       real(wp), intent(in) :: birth
@@ -311,8 +308,7 @@ contains
 
    !> Note what the contacts of a population have gone through since they attached.
    subroutine begin_hazard(self, row, duration, force)
-      !> The populations
-      class(activated_populations_type), intent(inout) :: self
+      class(thermal_populations_type), intent(inout) :: self
       !> Which one
       integer, intent(in) :: row
       !> The time since then [s], and the force on them
@@ -325,8 +321,7 @@ contains
 
    !> Let contacts that attach join a population that attached close by.
    subroutine join_last(self, row, origin, birth, contacts, force, displacement, time, energy)
-      !> The populations
-      class(activated_populations_type), intent(inout) :: self
+      class(thermal_populations_type), intent(inout) :: self
       !> Which population
       integer, intent(in) :: row
       !> Where and when they attach [m] and [s], how many they are, and the force on them
@@ -371,4 +366,4 @@ contains
       end associate
    end subroutine join_last
 
-end module mesoslip_contacts_populations_activated
+end module mesoslip_contacts_populations_thermal

@@ -1,20 +1,19 @@
 !> Contacts that break by thermal activation, whose thresholds change with their age.
 !>
-!> The rate of breaking of a contact then depends on its age, and clocks are not shared. A contact
-!> goes by the clock of a lower bound on its threshold, which gives a rate that is too high. Where
-!> it comes to its key it breaks with a probability, the ratio of its rate to that one; if it does
-!> not, it draws another deviate (P. Lewis and G. Shedler, Naval Research Logistics Quarterly 26
-!> (1979) 403). No error is made, and there is no time step. The bound of a growing threshold is its
-!> last value; that of a falling one is its value after a time, when the contact gets another
-!> bound.
-module mesoslip_contacts_activated_ageing
-   use mesoslip_contacts_activated_contacts, only: contact_activated_type, initialize_activated, &
-      & offer_activated
-   use mesoslip_contacts_activated_keys, only: exchange_activated, life_left, set_up_activated
+!> The rate of breaking then depends on the age of a contact, and clocks are not shared as they are.
+!> A contact has the key of a lower bound on its threshold, for which the rate is too high. Where it
+!> reaches that key, it breaks with a probability, the ratio of its rate to that of the bound;
+!> otherwise it draws another deviate (P. Lewis and G. Shedler, Naval Research Logistics Quarterly
+!> 26 (1979) 403). This is exact and has no time step. The bound of a growing threshold is its last
+!> value; that of a falling one is its value at a later time, when the bound is renewed.
+module mesoslip_contacts_thermal_ageing
    use mesoslip_contacts_ageing_law, only: ageing_law_type, take_ageing_law
    use mesoslip_contacts_base, only: contact_parameters_type, contacts_type
    use mesoslip_contacts_individual_break_tree, only: break_tree_type, new_break_tree
    use mesoslip_contacts_individual_record, only: row_limit, row_origin, row_renewal, row_stiffness
+   use mesoslip_contacts_thermal_contacts, only: thermal_contacts_type, initialize_thermal, &
+      & offer_by_clocks
+   use mesoslip_contacts_thermal_keys, only: exchange_thermal, life_left, set_up_keys
    use mesoslip_hazard, only: never
    use mesoslip_interface_law, only: interface_law_type, pose_type, window_type
    use mesoslip_numerics_archive, only: archive_type
@@ -26,66 +25,55 @@ module mesoslip_contacts_activated_ageing
    implicit none
    private
 
-   public :: contact_activated_ageing_type, make_activated_ageing
+   public :: thermal_ageing_contacts_type, make_thermal_ageing_contacts
 
    !> Gap to its threshold over the mean breaking stretch at which a contact breaks
    real(wp), parameter :: tiny_gap = 1.0e-12_wp
-   !> By how much a threshold falls until it has another bound: in units of f_T, and over the gap
-   !> between it and the force
+   !> Fall of a threshold until its bound is renewed: over f_T, and over the gap to the force
    real(wp), parameter :: max_drop = 0.5_wp, max_gap_part = 0.9_wp
-   !> Number of deviates that a contact may draw in a life, which are then drawn again
+   !> Number of deviates of a life, after which they repeat
    integer(i8), parameter :: max_attempts = 65535_i8
 
-   !> Numbers of the age of a contact: when it attached [s], its configured breaking stretch [m],
-   !> when its bound changes [s], and deviates drawn in its life
+   !> Numbers of the age of a contact: time of attaching [s], configured breaking stretch [m], time
+   !> at which its bound is renewed [s], and deviates drawn in its life
    integer, parameter :: age_length = 4
    integer, parameter :: age_birth = 1, age_limit = 2, age_renewal = 3, age_attempts = 4
 
-   !> Activated contacts that age. The limit in a record is a bound from below on the breaking
+   !> Thermally activated contacts that age. The limit in a record is a lower bound on the breaking
    !> stretch.
-   type, extends(contact_activated_type) :: contact_activated_ageing_type
+   type, extends(thermal_contacts_type) :: thermal_ageing_contacts_type
       !> How thresholds change
       type(ageing_law_type), private :: ageing
-      !> Numbers of their ages, shape (age_length, count)
+      !> Numbers of the ages, shape (age_length, count)
       real(wp), allocatable, private :: age(:, :)
-      !> Contacts in the order in which their bounds change
+      !> Contacts by the times at which their bounds are renewed
       type(break_tree_type), private :: order_renewal
       !> Whether contacts are those of the start
       logical, private :: is_start = .false.
    contains
-      procedure :: initialize
-      procedure :: offer
-      procedure :: plan
-      procedure :: prepare
-      procedure :: confirms
-      procedure :: renew_due
-      procedure :: rebuild
-      procedure :: records
-      procedure :: exchange
-      procedure, non_overridable, private :: bound, renew, threshold
-   end type contact_activated_ageing_type
+      procedure :: initialize, offer, plan, begin_life, accepts_break, update_bounds, rebuild, &
+         & records, exchange
+      procedure, non_overridable, private :: set_bound, renew_bound, threshold
+   end type thermal_ageing_contacts_type
 
 contains
 
    !> Set up contacts from named numbers.
-   subroutine make_activated_ageing(contacts, common, parameters, error)
-      !> The contacts
+   subroutine make_thermal_ageing_contacts(contacts, common, parameters, error)
       class(contacts_type), allocatable, intent(out) :: contacts
-      !> Parameters that all kinds of contacts have
       type(contact_parameters_type), intent(in) :: common
       !> The other numbers: the law of ageing, columns and rows, rate and force of activation
       type(parameters_type), intent(inout) :: parameters
-      !> Set if a number is missing or wrong, or there is not enough memory
       type(error_type), allocatable, intent(inout) :: error
 
-      type(contact_activated_ageing_type), allocatable :: self
+      type(thermal_ageing_contacts_type), allocatable :: self
       integer :: stat
 
       allocate (self)
       self%parameters = common
       call take_ageing_law(self%ageing, self%parameters%law, parameters, error)
       if (allocated(error)) return
-      call set_up_activated(self, parameters, error)
+      call set_up_keys(self, parameters, error)
       if (allocated(error)) return
       allocate (self%age(age_length, common%count), source=0.0_wp, stat=stat)
       if (stat /= 0) then
@@ -94,66 +82,52 @@ contains
       end if
       call new_break_tree(self%order_renewal, common%count, error)
       call move_alloc(self, contacts)
-   end subroutine make_activated_ageing
+   end subroutine make_thermal_ageing_contacts
 
-   !> Draw all contacts for the start of a run.
    subroutine initialize(self, state)
-      !> The contacts
-      class(contact_activated_ageing_type), intent(inout) :: self
-      !> One of the initial_ codes
+      class(thermal_ageing_contacts_type), intent(inout) :: self
       integer, intent(in) :: state
 
       self%is_start = .true.
-      call initialize_activated(self, state)
+      call initialize_thermal(self, state)
       self%is_start = .false.
    end subroutine initialize
 
-   !> Contact force as a law, which holds until something happens, or a bound changes.
+   !> The law holds until a contact breaks or attaches, its force changes its sign, or a bound is
+   !> renewed.
    subroutine offer(self, pose, law, window)
-      !> The contacts
-      class(contact_activated_ageing_type), intent(inout) :: self
-      !> Pose of the slider
+      class(thermal_ageing_contacts_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
-      !> The law
       type(interface_law_type), intent(out) :: law
-      !> Range in which it holds
       type(window_type), intent(out) :: window
 
-      call offer_activated(self, pose, law, window)
+      call offer_by_clocks(self, pose, law, window)
       window%end_time = min(window%end_time, self%order_renewal%first())
    end subroutine offer
 
-   !> Write no schedule: bounds of thresholds change with the time.
+   !> There are no schedules, as bounds change with the time.
    subroutine plan(self, pose, limit, schedule)
-      !> The contacts
-      class(contact_activated_ageing_type), intent(inout) :: self
-      !> Pose of the slider
+      class(thermal_ageing_contacts_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
-      !> Maximum number of breaks, and of attachments
       integer, intent(in) :: limit
-      !> The schedule, at its end
       type(schedule_type), intent(inout) :: schedule
 
       schedule%is_over = .true.
    end subroutine plan
 
-   !> Prepare the life of a contact that has attached.
-   subroutine prepare(self, contact, pose)
-      !> The contacts
-      class(contact_activated_ageing_type), intent(inout) :: self
-      !> Number of the contact
+   subroutine begin_life(self, contact, pose)
+      class(thermal_ageing_contacts_type), intent(inout) :: self
       integer, intent(in) :: contact
-      !> Pose of the slider
       type(pose_type), intent(in) :: pose
 
       self%age(:, contact) = [pose%time, self%record(row_limit, contact), never, 1.0_wp]
       if (self%is_start) self%age(age_birth, contact) = -self%ageing%initial_age
-      call self%bound(contact, pose)
-   end subroutine prepare
+      call self%set_bound(contact, pose)
+   end subroutine begin_life
 
-   !> Threshold of a contact at a time, as a stretch.
+   !> Threshold of a contact at a time, as a stretch [m].
    pure function threshold(self, contact, time)
-      class(contact_activated_ageing_type), intent(in) :: self
+      class(thermal_ageing_contacts_type), intent(in) :: self
       integer, intent(in) :: contact
       real(wp), intent(in) :: time
       real(wp) :: threshold
@@ -162,13 +136,13 @@ contains
          & time - self%age(age_birth, contact))
    end function threshold
 
-   !> Find a lower bound on the threshold of a contact, and until when it is one.
-   subroutine bound(self, contact, pose)
-      class(contact_activated_ageing_type), intent(inout) :: self
+   !> Set the lower bound on the threshold of a contact, and the time of its renewal.
+   subroutine set_bound(self, contact, pose)
+      class(thermal_ageing_contacts_type), intent(inout) :: self
       integer, intent(in) :: contact
       type(pose_type), intent(in) :: pose
 
-      real(wp) :: here, gap, lack
+      real(wp) :: here, gap, deficit
 
       here = self%threshold(contact, pose%time)
       self%record(row_limit, contact) = here
@@ -180,9 +154,9 @@ contains
             gap = min(max_drop / self%hazard%slope, &
                & max_gap_part * max(gap, tiny_gap * self%stretch))
             if (here - gap > age(age_limit)) then
-               lack = self%ageing%lack(age(age_limit), self%stretch)
+               deficit = self%ageing%deficit(age(age_limit), self%stretch)
                age(age_renewal) = max(nearest(pose%time, huge(1.0_wp)), age(age_birth) &
-                  & - self%ageing%time * log((here - gap - age(age_limit)) / (-lack)))
+                  & - self%ageing%time * log((here - gap - age(age_limit)) / (-deficit)))
                self%record(row_limit, contact) = min(here - gap, &
                   & self%threshold(contact, age(age_renewal)))
             else
@@ -191,49 +165,44 @@ contains
          end if
       end associate
       call self%order_renewal%set(contact, self%age(age_renewal, contact))
-   end subroutine bound
+   end subroutine set_bound
 
-   !> Give a contact another bound.
-   subroutine renew(self, contact, pose)
-      class(contact_activated_ageing_type), intent(inout) :: self
+   !> Renew the bound of a contact.
+   subroutine renew_bound(self, contact, pose)
+      class(thermal_ageing_contacts_type), intent(inout) :: self
       integer, intent(in) :: contact
       type(pose_type), intent(in) :: pose
 
-      call self%settle_deviate(contact)
+      call self%update_deviate(contact)
       call self%take_out(contact)
-      call self%bound(contact, pose)
+      call self%set_bound(contact, pose)
       call self%put(contact)
-   end subroutine renew
+   end subroutine renew_bound
 
-   !> Whether a contact breaks that has come to its bound, or its clock to its key.
-   function confirms(self, contact, pose, by_clock)
-      !> The contacts
-      class(contact_activated_ageing_type), intent(inout) :: self
-      !> Number of the contact
+   function accepts_break(self, contact, pose, by_clock)
+      class(thermal_ageing_contacts_type), intent(inout) :: self
       integer, intent(in) :: contact
-      !> Pose of the slider
       type(pose_type), intent(in) :: pose
-      !> Whether it is the clock
       logical, intent(in) :: by_clock
-      !> Whether it breaks
-      logical :: confirms
+      logical :: accepts_break
 
       real(wp) :: here, uniform(2)
       integer(i8) :: attempt
 
       here = self%threshold(contact, pose%time)
-      confirms = here - abs(pose%displacement - self%record(row_origin, contact)) &
+      accepts_break = here - abs(pose%displacement - self%record(row_origin, contact)) &
          & <= tiny_gap * self%stretch
-      if (by_clock .and. .not. confirms) then
+      if (by_clock .and. .not. accepts_break) then
          attempt = int(self%age(age_attempts, contact), i8)
          call draw(attempt)
-         confirms = uniform(2) <= exp(-self%hazard%slope * (here - self%record(row_limit, contact)))
+         accepts_break = uniform(2) &
+            & <= exp(-self%hazard%slope * (here - self%record(row_limit, contact)))
       end if
-      if (confirms) then
+      if (accepts_break) then
          call self%order_renewal%remove(contact)
          return
       end if
-      call self%renew(contact, pose)
+      call self%renew_bound(contact, pose)
       if (.not. by_clock) return
       attempt = mod(attempt, max_attempts) + 1_i8
       self%age(age_attempts, contact) = real(attempt, wp)
@@ -244,8 +213,7 @@ contains
 
    contains
 
-      !> Draw the deviates of an attempt: the exponential one is of the first, and whether the
-      !> contact breaks is of the second.
+      !> Draw uniform numbers of an attempt, for its deviate and for its acceptance.
       subroutine draw(attempt)
          integer(i8), intent(in) :: attempt
 
@@ -253,13 +221,12 @@ contains
             & int(contact - 1, i8), int(self%record(row_renewal, contact), i8), attempt, uniform)
       end subroutine draw
 
-   end function confirms
+   end function accepts_break
 
-   !> Give contacts other bounds whose bounds change now; those that fell to their forces break.
-   subroutine renew_due(self, pose)
-      !> The contacts
-      class(contact_activated_ageing_type), intent(inout) :: self
-      !> Pose of the slider
+   !> Renew the bounds that are due, and break contacts whose thresholds have fallen to their
+   !> forces.
+   subroutine update_bounds(self, pose)
+      class(thermal_ageing_contacts_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
 
       integer :: contact
@@ -267,20 +234,17 @@ contains
       do
          contact = self%order_renewal%due(pose%time)
          if (contact == 0) return
-         if (self%confirms(contact, pose, .false.)) call self%break_contact(contact, pose)
+         if (self%accepts_break(contact, pose, .false.)) call self%break_contact(contact, pose)
       end do
-   end subroutine renew_due
+   end subroutine update_bounds
 
-   !> Rebuild the queue from the records, lives and ages.
    subroutine rebuild(self, displacement)
-      !> The contacts
-      class(contact_activated_ageing_type), intent(inout) :: self
-      !> Displacement of the slider [m]
+      class(thermal_ageing_contacts_type), intent(inout) :: self
       real(wp), intent(in) :: displacement
 
       integer :: contact
 
-      call self%contact_activated_type%rebuild(displacement)
+      call self%thermal_contacts_type%rebuild(displacement)
       call self%order_renewal%clear()
       do contact = 1, self%parameters%count
          if (.not. self%record(row_stiffness, contact) > 0.0_wp) cycle
@@ -289,21 +253,15 @@ contains
       call self%order_renewal%arrange()
    end subroutine rebuild
 
-   !> State of some contacts.
    pure subroutine records(self, time, first, values)
-      !> The contacts
-      class(contact_activated_ageing_type), intent(in) :: self
-      !> Time [s]
+      class(thermal_ageing_contacts_type), intent(in) :: self
       real(wp), intent(in) :: time
-      !> The first of the contacts
       integer, intent(in) :: first
-      !> Origin [m], stiffness [N/m], 0 while it is detached, breaking stretch at the time [m],
-      !> number of renewals of each contact, shape (contact_record_length, contacts)
       real(wp), intent(out) :: values(:, :)
 
       integer :: contact, place
 
-      call self%contact_activated_type%records(time, first, values)
+      call self%thermal_contacts_type%records(time, first, values)
       do place = 1, size(values, 2)
          contact = first + place - 1
          if (.not. self%record(row_stiffness, contact) > 0.0_wp) cycle
@@ -311,16 +269,13 @@ contains
       end do
    end subroutine records
 
-   !> Put the state into an archive or take it out.
    subroutine exchange(self, archive)
-      !> The contacts
-      class(contact_activated_ageing_type), intent(inout) :: self
-      !> The archive
+      class(thermal_ageing_contacts_type), intent(inout) :: self
       type(archive_type), intent(inout) :: archive
 
-      call exchange_activated(self, archive)
-      call archive%section("ages of activated contacts")
+      call exchange_thermal(self, archive)
+      call archive%section("ages of thermal contacts")
       call archive%exchange("age", self%age)
    end subroutine exchange
 
-end module mesoslip_contacts_activated_ageing
+end module mesoslip_contacts_thermal_ageing

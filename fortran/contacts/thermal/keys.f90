@@ -1,10 +1,10 @@
 !> Contacts that break by thermal activation: their clocks, keys and order.
 !>
-!> A contact goes by the clock of the sign of its force. Its key is the reading at which it breaks,
-!> relative to a reference displacement near the slider's, which moves along. In a motion ahead, the
-!> direction that is kept until something happens on the way back, a contact comes to its threshold,
-!> or to where its force changes its sign; on the way back that is bounded.
-module mesoslip_contacts_activated_keys
+!> A contact belongs to the clock of the sign of its force. Its key is the reading at which it
+!> breaks, relative to a reference displacement that is moved along with the slider. In the
+!> direction ahead, which is kept until an event on the way back, the next event of a contact is its
+!> break at the threshold or a change of the sign of its force. On the way back events are bounded.
+module mesoslip_contacts_thermal_keys
    use mesoslip_contacts_individual_base, only: exchange_individual, individual_contacts_type
    use mesoslip_contacts_individual_record, only: row_limit, row_origin, row_stiffness
    use mesoslip_contacts_individual_scan_order, only: new_scan_order, scan_order_type
@@ -18,17 +18,16 @@ module mesoslip_contacts_activated_keys
    implicit none
    private
 
-   public :: activated_keys_type, set_up_activated, exchange_activated
+   public :: thermal_keys_type, set_up_keys, exchange_thermal
    public :: life_clock, life_left, life_key, life_next, motions
 
-   !> Stretch over the mean breaking stretch beyond zero at which the sign of a force changes: less
-   !> than matters, and more than rounding
+   !> Stretch over the mean breaking stretch at which the sign of a force changes: negligible, but
+   !> larger than rounding errors
    real(wp), parameter :: tiny_stretch = 1.0e-12_wp
    !> Maximum change of the exponents up to which keys are rescaled rather than solved again
    real(wp), parameter :: max_rescaling = 310.0_wp
-   !> Numbers of the life of a contact: the clock it goes by, none while it is detached, what was
-   !> left of its deviate when its key was made, the key, and the deviate of its next life, or 0 if
-   !> that has not been drawn
+   !> Numbers of the life of a contact: its clock, 0 while it is detached; the remaining deviate
+   !> when its key was solved; the key; and the deviate of its next life, 0 until it is drawn
    integer, parameter :: life_length = 4
    integer, parameter :: life_clock = 1, life_left = 2, life_key = 3, life_next = 4
 
@@ -36,58 +35,38 @@ module mesoslip_contacts_activated_keys
    integer, parameter :: motions = 2
 
    !> Contacts that break by thermal activation, in order.
-   type, abstract, extends(individual_contacts_type) :: activated_keys_type
-      !> The clocks
+   type, abstract, extends(individual_contacts_type) :: thermal_keys_type
       type(hazard_type) :: hazard
       !> Mean breaking stretch [m]
       real(wp) :: stretch = 1.0_wp
-      !> Numbers of their lives, shape (life_length, count)
+      !> Numbers of the lives, shape (life_length, count)
       real(wp), allocatable :: life(:, :)
-      !> Contacts in the order of what comes next in a motion up and down, a break at the threshold
-      !> or a change of the force's sign, then in that of their keys by each clock. In one array, as
-      !> of two components of this type gfortran 12 frees only one
+      !> Contacts by their next event in a motion up and down, a break at the threshold or a change
+      !> of the force's sign, then by their keys of each clock. One array, because gfortran 12 frees
+      !> only one of two components of this type
       type(scan_order_type) :: order(motions + clocks)
-      !> The order of a motion ahead
+      !> The order of the direction ahead
       integer :: ahead = 1
-      !> Number of contacts that go by each clock
+      !> Number of contacts of each clock
       integer :: members(clocks) = 0
-      !> Whether the slider moves uniformly, and its velocity then [m/s]. The key of a contact is
-      !> the stretch along the motion at which its deviate is used up, and it is in the order of a
-      !> motion ahead alone
+      !> Whether the slider moves uniformly, and its velocity then [m/s]. Then the key of a contact
+      !> is its stretch along the motion where its deviate is used up, and only the order ahead is
+      !> kept
       logical :: is_steady = .false.
       real(wp) :: velocity = 0.0_wp
    contains
-      procedure :: rebuild
-      procedure :: shift_order
-      procedure :: behind_of
-      !> Find what is left of the deviate of a contact now
-      procedure, non_overridable :: settle_deviate
-      !> Put a contact into all orders, and take it out
-      procedure, non_overridable :: put, take_out
-      !> Put a contact with a key into all orders
-      procedure, non_overridable :: place
-      !> The force of a contact changes its sign
-      procedure, non_overridable :: change_sign
-      !> Distance ahead of its origin at which something happens to a contact
-      procedure, non_overridable :: distance_ahead
-      !> Coordinate behind which nothing happens to a contact at first
-      procedure, non_overridable :: distance_behind
-      !> Move the reference of a clock to the slider
-      procedure, non_overridable :: move_reference
-      !> Turn to the other direction of motion
-      procedure, non_overridable :: turn_round
+      procedure :: rebuild, shift_order, behind_of, exchange => exchange_thermal
+      procedure, non_overridable :: put, insert, take_out, change_sign, clear_orders
+      procedure, non_overridable :: update_deviate, distance, move_reference, reverse_if_due
       procedure, non_overridable, private :: set_key
-   end type activated_keys_type
+   end type thermal_keys_type
 
 contains
 
-   !> Set up contacts that break by thermal activation.
-   subroutine set_up_activated(self, parameters, error)
-      !> The contacts, of which is known what is common to all kinds
-      class(activated_keys_type), intent(inout) :: self
-      !> The other numbers: columns and rows, rate and force of activation
+   !> Set up contacts with common parameters from the other numbers.
+   subroutine set_up_keys(self, parameters, error)
+      class(thermal_keys_type), intent(inout) :: self
       type(parameters_type), intent(inout) :: parameters
-      !> Set if a number is missing or wrong, or there is not enough memory
       type(error_type), allocatable, intent(inout) :: error
 
       real(wp) :: force
@@ -118,43 +97,39 @@ contains
          call raise(error, status_memory, "not enough memory for the lives of contacts")
          return
       end if
-      do number = 1, clocks
-         if (.not. allocated(error)) then
-            call new_scan_order(self%order(number), self%parameters%count, error)
-         end if
-         if (.not. allocated(error)) then
-            call new_scan_order(self%order(motions + number), self%parameters%count, error)
-         end if
+      do number = 1, size(self%order)
+         if (allocated(error)) return
+         call new_scan_order(self%order(number), self%parameters%count, error)
       end do
-   end subroutine set_up_activated
+   end subroutine set_up_keys
 
-   !> The force of a contact changes its sign: what is left of its deviate goes by the other clock.
+   !> Move a contact to the other clock, as the sign of its force changes.
    subroutine change_sign(self, contact)
-      class(activated_keys_type), intent(inout) :: self
+      class(thermal_keys_type), intent(inout) :: self
       integer, intent(in) :: contact
 
       integer :: old
 
       old = int(self%life(life_clock, contact))
-      call self%settle_deviate(contact)
+      call self%update_deviate(contact)
       call self%take_out(contact)
       self%life(life_clock, contact) = real(clocks + 1 - old, wp)
       call self%put(contact)
    end subroutine change_sign
 
-   !> Put a contact into all orders.
+   !> Solve the key of a contact, and insert the contact into all orders.
    subroutine put(self, contact)
-      class(activated_keys_type), intent(inout) :: self
+      class(thermal_keys_type), intent(inout) :: self
       integer, intent(in) :: contact
 
       call self%set_key(contact)
-      call self%place(contact)
+      call self%insert(contact)
       self%behind = max(self%behind, self%behind_of(contact))
    end subroutine put
 
-   !> Put a contact with a key into all orders.
-   subroutine place(self, contact)
-      class(activated_keys_type), intent(inout) :: self
+   !> Insert a contact with a key into all orders.
+   subroutine insert(self, contact)
+      class(thermal_keys_type), intent(inout) :: self
       integer, intent(in) :: contact
 
       integer :: number
@@ -170,16 +145,16 @@ contains
       associate (origin => self%record(row_origin, contact), &
          & limit => self%record(row_limit, contact))
          call self%order(self%ahead)%put(contact, self%direction * origin &
-            & + self%distance_ahead(number, limit))
+            & + self%distance(number, limit, self%direction))
          call self%order(3 - self%ahead)%put(contact, -(self%direction * origin &
-            & - self%distance_behind(number, limit)))
+            & - self%distance(number, limit, -self%direction)))
       end associate
       self%members(number) = self%members(number) + 1
-   end subroutine place
+   end subroutine insert
 
    !> Take a contact out of all orders.
    subroutine take_out(self, contact)
-      class(activated_keys_type), intent(inout) :: self
+      class(thermal_keys_type), intent(inout) :: self
       integer, intent(in) :: contact
 
       integer :: number
@@ -195,50 +170,31 @@ contains
       self%members(number) = self%members(number) - 1
    end subroutine take_out
 
-   !> Distance ahead of its origin at which a contact breaks at its threshold, or its force gets the
-   !> sign of the motion.
-   pure function distance_ahead(self, number, limit) result(distance)
-      class(activated_keys_type), intent(in) :: self
-      !> The clock it goes by
+   !> Distance from the origin of a contact [m] to its next event in a direction, given its clock
+   !> and its breaking stretch [m]: a break at the threshold, or a change of the force's sign.
+   pure function distance(self, number, limit, direction)
+      class(thermal_keys_type), intent(in) :: self
       integer, intent(in) :: number
-      !> Stretch at which it breaks [m]
-      real(wp), intent(in) :: limit
+      real(wp), intent(in) :: limit, direction
       real(wp) :: distance
 
-      distance = merge(limit, tiny_stretch * self%stretch, &
-         & force_sign(number) * self%direction > 0.0_wp)
-   end function distance_ahead
+      distance = merge(limit, tiny_stretch * self%stretch, force_sign(number) * direction > 0.0_wp)
+   end function distance
 
-   !> The same on the way back.
-   pure function distance_behind(self, number, limit) result(distance)
-      class(activated_keys_type), intent(in) :: self
-      !> The clock it goes by
-      integer, intent(in) :: number
-      !> Stretch at which it breaks [m]
-      real(wp), intent(in) :: limit
-      real(wp) :: distance
-
-      distance = merge(tiny_stretch * self%stretch, limit, &
-         & force_sign(number) * self%direction > 0.0_wp)
-   end function distance_behind
-
-   !> Coordinate at which a pinned contact breaks on the way back, or its force changes its sign.
+   !> Also where its force changes its sign.
    pure function behind_of(self, contact) result(coordinate)
-      !> The contacts
-      class(activated_keys_type), intent(in) :: self
-      !> Number of the contact
+      class(thermal_keys_type), intent(in) :: self
       integer, intent(in) :: contact
-      !> The coordinate [m]
       real(wp) :: coordinate
 
       coordinate = self%direction * self%record(row_origin, contact) &
-         & - self%distance_behind(int(self%life(life_clock, contact)), &
-         & self%record(row_limit, contact))
+         & - self%distance(int(self%life(life_clock, contact)), self%record(row_limit, contact), &
+         & -self%direction)
    end function behind_of
 
-   !> Set the key of a contact from what is left of its deviate.
+   !> Solve the key of a contact from its remaining deviate.
    subroutine set_key(self, contact)
-      class(activated_keys_type), intent(inout) :: self
+      class(thermal_keys_type), intent(inout) :: self
       integer, intent(in) :: contact
 
       self%life(life_key, contact) = self%hazard%key(int(self%life(life_clock, contact)), &
@@ -246,50 +202,53 @@ contains
          & self%record(row_origin, contact))
    end subroutine set_key
 
-   !> Find what is left of the deviate of a contact now.
-   subroutine settle_deviate(self, contact)
-      class(activated_keys_type), intent(inout) :: self
+   !> Set the remaining deviate of a contact to the present one.
+   subroutine update_deviate(self, contact)
+      class(thermal_keys_type), intent(inout) :: self
       integer, intent(in) :: contact
 
       self%life(life_left, contact) = self%hazard%left(int(self%life(life_clock, contact)), &
          & self%life(life_key, contact), self%life(life_left, contact), &
          & self%record(row_limit, contact), self%record(row_origin, contact))
-   end subroutine settle_deviate
+   end subroutine update_deviate
 
-   !> Move the reference of a clock to the slider, if that is far from it or no contact goes by it.
+   !> Move the reference of a clock to the slider [m], if it is far or no contact belongs to the
+   !> clock.
    subroutine move_reference(self, number, displacement)
-      class(activated_keys_type), intent(inout) :: self
+      class(thermal_keys_type), intent(inout) :: self
       integer, intent(in) :: number
-      !> Displacement of the slider [m]
       real(wp), intent(in) :: displacement
 
       real(wp) :: exponent, reading
-      logical :: far, is_done
+      logical :: far, has_keys
+      integer :: contact
 
-      is_done = self%members(number) == 0
+      has_keys = self%members(number) == 0
       exponent = self%hazard%rate_exponent(number, displacement)
       reading = self%hazard%reading(number)
-      if (.not. is_done) then
+      if (.not. has_keys) then
          call self%hazard%is_far(number, displacement, far)
          if (.not. far) return
-         ! The rest of the deviate until a key changes by one factor for all.
+         ! The part of a key beyond the reading changes by one factor for all.
          if (abs(exponent) < max_rescaling) call self%order(motions + number)%rescale(reading, &
-            & exp(-exponent), self%members(number), is_done)
-         if (is_done) then
+            & exp(-exponent), self%members(number), has_keys)
+         if (has_keys) then
             call rescale_lives(self, number, reading, exp(-exponent))
          else
-            call settle_deviates(self, number)
+            do contact = 1, self%parameters%count
+               if (int(self%life(life_clock, contact)) == number) call self%update_deviate(contact)
+            end do
          end if
       end if
       self%hazard%reference(number) = displacement
       self%hazard%reading(number) = 0.0_wp
       self%hazard%max_exponent(number) = 0.0_wp
-      if (.not. is_done) call set_keys(self, number)
+      if (.not. has_keys) call set_keys(self, number)
    end subroutine move_reference
 
-   !> Count the keys in the lives of the contacts of a clock from its reading, in another unit.
+   !> Rescale the keys in the lives of the contacts of a clock as those in its order.
    subroutine rescale_lives(self, number, reading, factor)
-      class(activated_keys_type), intent(inout) :: self
+      class(thermal_keys_type), intent(inout) :: self
       integer, intent(in) :: number
       real(wp), intent(in) :: reading, factor
 
@@ -303,21 +262,9 @@ contains
       end do
    end subroutine rescale_lives
 
-   !> Find what is left of the deviates of the contacts of a clock now.
-   subroutine settle_deviates(self, number)
-      class(activated_keys_type), intent(inout) :: self
-      integer, intent(in) :: number
-
-      integer :: contact
-
-      do contact = 1, self%parameters%count
-         if (int(self%life(life_clock, contact)) == number) call self%settle_deviate(contact)
-      end do
-   end subroutine settle_deviates
-
-   !> Set the keys of the contacts of a clock.
+   !> Solve the keys of the contacts of a clock.
    subroutine set_keys(self, number)
-      class(activated_keys_type), intent(inout) :: self
+      class(thermal_keys_type), intent(inout) :: self
       integer, intent(in) :: number
 
       integer :: contact
@@ -330,62 +277,62 @@ contains
       end do
    end subroutine set_keys
 
-   !> Turn to the other direction of motion, if something happens to a contact where the slider is
-   !> on the way back: the bound may be that of a contact which has broken since.
-   subroutine turn_round(self, displacement)
-      class(activated_keys_type), intent(inout) :: self
-      !> Displacement of the slider [m]
+   !> Reverse the direction ahead if the slider at a displacement [m] has reached an event on the
+   !> way back.
+   subroutine reverse_if_due(self, displacement)
+      class(thermal_keys_type), intent(inout) :: self
       real(wp), intent(in) :: displacement
 
       if (self%direction * displacement > self%behind) return
+      ! The bound may be that of a contact that has broken since.
       self%behind = -self%order(3 - self%ahead)%lowest()
       if (self%direction * displacement > self%behind) return
       self%ahead = 3 - self%ahead
       self%direction = -self%direction
       self%behind = -self%order(3 - self%ahead)%lowest()
       if (self%direction > 0.0_wp) call self%order(2)%rest()
-   end subroutine turn_round
+   end subroutine reverse_if_due
 
-   !> Rebuild the queue from the records and lives.
    subroutine rebuild(self, displacement)
-      !> The contacts
-      class(activated_keys_type), intent(inout) :: self
-      !> Displacement of the slider [m]
+      class(thermal_keys_type), intent(inout) :: self
       real(wp), intent(in) :: displacement
 
-      integer :: contact, number
+      integer :: contact
 
-      self%ahead = merge(1, 2, self%direction > 0.0_wp)
-      do number = 1, clocks
-         call self%order(number)%clear()
-         call self%order(motions + number)%clear()
-      end do
-      self%members = 0
+      call self%clear_orders()
       do contact = 1, self%parameters%count
-         if (self%record(row_stiffness, contact) > 0.0_wp) call self%place(contact)
+         if (self%record(row_stiffness, contact) > 0.0_wp) call self%insert(contact)
       end do
    end subroutine rebuild
 
-   !> Move the references of the clocks.
+   !> Clear all orders, for the present direction of motion.
+   subroutine clear_orders(self)
+      class(thermal_keys_type), intent(inout) :: self
+
+      integer :: number
+
+      self%ahead = merge(1, 2, self%direction > 0.0_wp)
+      self%members = 0
+      do number = 1, size(self%order)
+         call self%order(number)%clear()
+      end do
+   end subroutine clear_orders
+
+   !> Shift the references of the clocks.
    subroutine shift_order(self, shift)
-      !> The contacts, their records moved
-      class(activated_keys_type), intent(inout) :: self
-      !> Displacement of the new origin [m]
+      class(thermal_keys_type), intent(inout) :: self
       real(wp), intent(in) :: shift
 
       self%hazard%reference = self%hazard%reference - shift
    end subroutine shift_order
 
-   !> Put what all activated contacts keep into an archive or take it out.
-   subroutine exchange_activated(self, archive)
-      !> The contacts
-      class(activated_keys_type), intent(inout) :: self
-      !> The archive
+   subroutine exchange_thermal(self, archive)
+      class(thermal_keys_type), intent(inout) :: self
       type(archive_type), intent(inout) :: archive
 
       integer :: number
 
-      call archive%section("activated contacts")
+      call archive%section("thermal contacts")
       call exchange_individual(self, archive)
       call archive%exchange("life", self%life)
       call archive%exchange("is_steady", self%is_steady)
@@ -395,6 +342,6 @@ contains
          call archive%exchange("reference", self%hazard%reference(number))
          call archive%exchange("max_exponent", self%hazard%max_exponent(number))
       end do
-   end subroutine exchange_activated
+   end subroutine exchange_thermal
 
-end module mesoslip_contacts_activated_keys
+end module mesoslip_contacts_thermal_keys

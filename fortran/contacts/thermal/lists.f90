@@ -1,68 +1,42 @@
-!> Schedules of contacts that break by thermal activation: which of them are listed, and the books
-!> of those that came.
-module mesoslip_contacts_activated_lists
-   use mesoslip_contacts_activated_keys, only: activated_keys_type, life_clock, life_key, &
-      & life_left, life_next, motions, set_up_activated
+!> Schedules of contacts that break by thermal activation, with clocks.
+module mesoslip_contacts_thermal_lists
    use mesoslip_contacts_individual_births, only: drag_of
    use mesoslip_contacts_individual_record, only: row_limit, row_origin, row_renewal, row_stiffness
+   use mesoslip_contacts_thermal_keys, only: thermal_keys_type, life_clock, life_key, &
+      & life_left, life_next, motions
    use mesoslip_hazard, only: never
    use mesoslip_interface_law, only: clocks, pose_type
-   use mesoslip_numerics_errors, only: error_type, raise, status_memory
    use mesoslip_numerics_kinds, only: i8, wp
-   use mesoslip_numerics_parameters, only: parameters_type
    use mesoslip_numerics_random, only: uniform_pairs
    use mesoslip_schedule, only: max_events, schedule_type
    implicit none
    private
 
-   public :: activated_lists_type, set_up_lists
+   public :: thermal_lists_type
 
    !> Minimum length of a schedule
    integer, parameter :: min_length = 4
 
-   !> Contacts that break by thermal activation, and write schedules.
-   type, abstract, extends(activated_keys_type) :: activated_lists_type
+   !> Contacts that break by thermal activation, and write schedules with clocks.
+   type, abstract, extends(thermal_keys_type) :: thermal_lists_type
       !> Contacts of the schedule, by coordinate and by clock, and those that attach in it
       integer, private :: listed(max_events) = 0, clock_listed(max_events) = 0, &
          & attaching(max_events) = 0
-      !> Length of the next schedule, by how far the slider came in the last one
+      !> Length of the next schedule, by how much of the last one happened
       integer, private :: max_length = max_events
-      !> Entry of each contact in the list by coordinate, 0 but while lists are written
-      integer, allocatable, private :: entry(:)
+      !> Entry of each contact in the list by coordinate; 0 except while lists are written
+      integer, allocatable :: entry(:)
    contains
-      !> Write a schedule by clocks
-      procedure, non_overridable :: plan_by_clocks
-      !> Find where the clocks come to their next keys
-      procedure, non_overridable :: set_next
-      !> Draw the deviates of the next lives of contacts
-      procedure, non_overridable :: draw_deviates
-      !> Keep the books of the contacts of a schedule
-      procedure, non_overridable :: settle_lists
+      procedure, non_overridable :: plan_by_clocks, set_next, draw_deviates, settle_lists
       procedure, non_overridable, private :: list_attaching, list_breaks, detach_came, turn_came, &
          & attach_came
-   end type activated_lists_type
+   end type thermal_lists_type
 
 contains
 
-   !> Set up contacts that write schedules.
-   subroutine set_up_lists(self, parameters, error)
-      !> The contacts, of which is known what is common to all kinds
-      class(activated_lists_type), intent(inout) :: self
-      !> The other numbers: columns and rows, rate and force of activation
-      type(parameters_type), intent(inout) :: parameters
-      !> Set if a number is missing or wrong, or there is not enough memory
-      type(error_type), allocatable, intent(inout) :: error
-
-      integer :: stat
-
-      call set_up_activated(self, parameters, error)
-      allocate (self%entry(self%parameters%count), source=0, stat=stat)
-      if (stat /= 0) call raise(error, status_memory, "not enough memory for lists of contacts")
-   end subroutine set_up_lists
-
-   !> Find where the clocks come to their next keys.
+   !> Set the next keys of the clocks.
    subroutine set_next(self)
-      class(activated_lists_type), intent(inout) :: self
+      class(thermal_lists_type), intent(inout) :: self
 
       integer :: number
 
@@ -74,10 +48,9 @@ contains
       end do
    end subroutine set_next
 
-   !> Draw the deviates of the next lives of contacts that have none yet.
+   !> Draw the deviates of the next lives of at most max_events contacts, if they have none.
    subroutine draw_deviates(self, contact, later)
-      class(activated_lists_type), intent(inout) :: self
-      !> Their numbers, at most max_events
+      class(thermal_lists_type), intent(inout) :: self
       integer, intent(in) :: contact(:)
       !> Renewals until those lives: 1 for pinned contacts
       integer(i8), intent(in) :: later
@@ -102,16 +75,12 @@ contains
       end do
    end subroutine draw_deviates
 
-   !> Write a schedule of what comes next: breaks at thresholds and by the clock of those whose
-   !> force has the sign of the motion, and attachments.
+   !> Write a schedule of breaks at thresholds, of breaks by the clock of the forces along the
+   !> motion, and of attachments.
    subroutine plan_by_clocks(self, pose, limit, schedule)
-      !> The contacts
-      class(activated_lists_type), intent(inout) :: self
-      !> Pose of the slider
+      class(thermal_lists_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
-      !> Maximum number of breaks, and of attachments
       integer, intent(in) :: limit
-      !> The schedule; at its end if there is none
       type(schedule_type), intent(inout) :: schedule
 
       integer :: length
@@ -129,19 +98,18 @@ contains
       schedule%hazard%next(schedule%number) = schedule%clock_key(1)
       schedule%direction = self%direction
       schedule%behind = self%behind
-      schedule%tiny_stretch = self%distance_behind(schedule%number, 0.0_wp)
+      schedule%tiny_stretch = self%distance(schedule%number, 0.0_wp, -self%direction)
       schedule%break_stiffness(1) = self%parameters%stiffness
       schedule%break_drag(1) = drag_of(self%parameters, self%parameters%stiffness)
       call self%list_attaching(length, pose%direction, schedule)
       schedule%is_over = .false.
    end subroutine plan_by_clocks
 
-   !> List the next attachments, and the births of those that may attach in the schedule.
+   !> List the next attachments in a direction of motion, and the births of contacts that break and
+   !> may attach in the schedule.
    subroutine list_attaching(self, limit, direction, schedule)
-      class(activated_lists_type), intent(inout) :: self
-      !> Maximum number of attachments
+      class(thermal_lists_type), intent(inout) :: self
       integer, intent(in) :: limit
-      !> Sign of the velocity at which they attach
       real(wp), intent(in) :: direction
       type(schedule_type), intent(inout) :: schedule
 
@@ -149,7 +117,7 @@ contains
 
       call self%list_attachments(limit, direction, schedule, self%attaching)
       do event = 1, schedule%attachments
-         ! One that goes by the other clock ends the schedule.
+         ! A contact of the other clock ends the schedule.
          if (direction * schedule%attach_stretch(event) < 0.0_wp) exit
       end do
       schedule%attachments = event - 1
@@ -176,11 +144,10 @@ contains
       end associate
    end subroutine list_attaching
 
-   !> List the next breaks at thresholds, those whose forces get the sign of the motion with them,
-   !> and breaks by the clock. That list ends at a key that is not known.
+   !> List the next breaks at thresholds, with the contacts of the other clock whose forces change
+   !> their sign, and breaks by the clock. That list ends before a key that is not known.
    subroutine list_breaks(self, limit, schedule)
-      class(activated_lists_type), intent(inout) :: self
-      !> Maximum length of each list
+      class(thermal_lists_type), intent(inout) :: self
       integer, intent(in) :: limit
       type(schedule_type), intent(inout) :: schedule
 
@@ -239,11 +206,9 @@ contains
       end if
    end subroutine list_breaks
 
-   !> Keep the books of the contacts of a schedule.
+   !> Update the contacts after a schedule.
    subroutine settle_lists(self, schedule)
-      !> The contacts
-      class(activated_lists_type), intent(inout) :: self
-      !> The schedule, as far as the slider came
+      class(thermal_lists_type), intent(inout) :: self
       type(schedule_type), intent(in) :: schedule
 
       self%max_length = min(max_events, max(min_length, &
@@ -255,9 +220,9 @@ contains
       self%behind = schedule%behind
    end subroutine settle_lists
 
-   !> Keep the books of the contacts of a schedule that broke.
+   !> Update the contacts that broke.
    subroutine detach_came(self, schedule)
-      class(activated_lists_type), intent(inout) :: self
+      class(thermal_lists_type), intent(inout) :: self
       type(schedule_type), intent(in) :: schedule
 
       real(wp) :: delay
@@ -286,9 +251,9 @@ contains
       self%drag = schedule%drag
    end subroutine detach_came
 
-   !> Keep the books of the contacts of a schedule whose forces changed their signs.
+   !> Update the contacts whose forces changed their sign.
    subroutine turn_came(self, schedule)
-      class(activated_lists_type), intent(inout) :: self
+      class(thermal_lists_type), intent(inout) :: self
       type(schedule_type), intent(in) :: schedule
 
       integer :: event
@@ -300,14 +265,14 @@ contains
             call self%take_out(contact)
             self%life(:life_key, contact) = [real(schedule%number, wp), &
                & schedule%turn_left(event), schedule%turn_key(event)]
-            call self%place(contact)
+            call self%insert(contact)
          end associate
       end do
    end subroutine turn_came
 
-   !> Keep the books of the contacts of a schedule that attached.
+   !> Update the contacts that attached.
    subroutine attach_came(self, schedule)
-      class(activated_lists_type), intent(inout) :: self
+      class(thermal_lists_type), intent(inout) :: self
       type(schedule_type), intent(in) :: schedule
 
       integer :: event, contact(max_events)
@@ -316,8 +281,8 @@ contains
       do event = 1, schedule%attached
          self%life(:, contact(event)) = [real(schedule%number, wp), schedule%attach_left(event), &
             & schedule%attach_key(event), 0.0_wp]
-         call self%place(contact(event))
+         call self%insert(contact(event))
       end do
    end subroutine attach_came
 
-end module mesoslip_contacts_activated_lists
+end module mesoslip_contacts_thermal_lists

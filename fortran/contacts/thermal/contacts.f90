@@ -2,21 +2,19 @@
 !>
 !> A contact under the force f breaks at the rate omega_0 exp((abs(f) - f_s)/f_T), and at once where
 !> abs(f) = f_s (Bell's law). Contacts whose forces have one sign share a clock, the integral of
-!> omega_0 exp(s k (X - R)/f_T) over the time, s being the sign and R a displacement near the
-!> slider's. Each draws an exponential deviate once in a life; it breaks where its clock has gone on
-!> by the deviate times exp((f_s + s k (Y - R))/f_T), a key known when it attaches. Where its force
-!> changes its sign, what is left of the deviate goes on with the other clock. There is no time
+!> omega_0 exp(s k (X - R)/f_T) over the time, where s is the sign and R a displacement near the
+!> slider's. Each contact draws an exponential deviate E once in a life. It breaks when its clock
+!> has advanced by E exp((f_s + s k (Y - R))/f_T), a key that is known when it attaches. Where its
+!> force changes its sign, the remaining deviate continues with the other clock. There is no time
 !> step.
-module mesoslip_contacts_activated_contacts
-   use mesoslip_contacts_activated_keys, only: exchange_activated, life_clock, life_key, &
-      & life_left, life_next, motions
-   use mesoslip_contacts_activated_steady, only: activated_steady_type, set_up_steady
+module mesoslip_contacts_thermal_contacts
    use mesoslip_contacts_base, only: contact_parameters_type, contacts_type
    use mesoslip_contacts_individual_base, only: total_law
    use mesoslip_contacts_individual_record, only: row_origin
+   use mesoslip_contacts_thermal_keys, only: life_clock, life_key, life_left, life_next, motions
+   use mesoslip_contacts_thermal_steady, only: thermal_steady_type, set_up_steady
    use mesoslip_hazard, only: force_sign, never
    use mesoslip_interface_law, only: clocks, interface_law_type, pose_type, window_type
-   use mesoslip_numerics_archive, only: archive_type
    use mesoslip_numerics_errors, only: error_type
    use mesoslip_numerics_kinds, only: i8, wp
    use mesoslip_numerics_parameters, only: parameters_type
@@ -24,58 +22,40 @@ module mesoslip_contacts_activated_contacts
    implicit none
    private
 
-   public :: contact_activated_type, make_contact_activated
+   public :: thermal_contacts_type, make_thermal_contacts
    ! For kinds that extend this one: a call by a component would lose their own procedures.
-   public :: initialize_activated, offer_activated
+   public :: initialize_thermal, offer_by_clocks
 
    !> Contacts that break by thermal activation.
-   type, extends(activated_steady_type) :: contact_activated_type
+   type, extends(thermal_steady_type) :: thermal_contacts_type
    contains
-      procedure :: initialize => initialize_activated
-      procedure :: offer
-      procedure :: respond => respond_activated
-      procedure :: plan
-      procedure :: settle
-      procedure :: join
-      procedure :: exchange
-      !> Prepare the life of a contact that has attached
-      procedure :: prepare
-      !> Whether a contact breaks that has come to its threshold, or its clock to its key
-      procedure :: confirms
-      !> Take note of what has changed with the time alone
-      procedure :: renew_due
-      !> A contact breaks
+      procedure :: initialize => initialize_thermal
+      procedure :: offer, respond, plan, settle, join, begin_life, accepts_break, update_bounds
       procedure, non_overridable :: break_contact
-      procedure, non_overridable, private :: respond_here, pass_ahead, break_activated, &
+      procedure, non_overridable, private :: break_and_attach, pass_ahead, break_by_clock, &
          & respond_steadily
-   end type contact_activated_type
+   end type thermal_contacts_type
 
 contains
 
    !> Set up contacts from named numbers.
-   subroutine make_contact_activated(contacts, common, parameters, error)
-      !> The contacts
+   subroutine make_thermal_contacts(contacts, common, parameters, error)
       class(contacts_type), allocatable, intent(out) :: contacts
-      !> Parameters that all kinds of contacts have
       type(contact_parameters_type), intent(in) :: common
       !> The other numbers: columns and rows, rate and force of activation
       type(parameters_type), intent(inout) :: parameters
-      !> Set if a number is missing or wrong, or there is not enough memory
       type(error_type), allocatable, intent(inout) :: error
 
-      type(contact_activated_type), allocatable :: self
+      type(thermal_contacts_type), allocatable :: self
 
       allocate (self)
       self%parameters = common
       call set_up_steady(self, parameters, error)
       call move_alloc(self, contacts)
-   end subroutine make_contact_activated
+   end subroutine make_thermal_contacts
 
-   !> Draw all contacts for the start of a run.
-   subroutine initialize_activated(self, state)
-      !> The contacts
-      class(contact_activated_type), intent(inout) :: self
-      !> One of the initial_ codes
+   subroutine initialize_thermal(self, state)
+      class(thermal_contacts_type), intent(inout) :: self
       integer, intent(in) :: state
 
       type(pose_type) :: pose
@@ -85,25 +65,20 @@ contains
       do contact = 1, self%parameters%count
          call self%join(contact, pose)
       end do
-   end subroutine initialize_activated
+   end subroutine initialize_thermal
 
-   !> Contact force as a law, which holds until a contact breaks or attaches, or its force changes
-   !> its sign.
+   !> The law holds until a contact breaks or attaches, or its force changes its sign.
    subroutine offer(self, pose, law, window)
-      !> The contacts
-      class(contact_activated_type), intent(inout) :: self
-      !> Pose of the slider
+      class(thermal_contacts_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
-      !> The law
       type(interface_law_type), intent(out) :: law
-      !> Range in which it holds
       type(window_type), intent(out) :: window
 
       real(wp) :: ahead
 
       call self%follow_motion(pose)
       if (.not. self%is_steady) then
-         call offer_activated(self, pose, law, window)
+         call offer_by_clocks(self, pose, law, window)
          return
       end if
       law = total_law(self)
@@ -112,15 +87,10 @@ contains
       self%clock%is_used = .false.
    end subroutine offer
 
-   !> Write a schedule of what comes next.
    subroutine plan(self, pose, limit, schedule)
-      !> The contacts
-      class(contact_activated_type), intent(inout) :: self
-      !> Pose of the slider
+      class(thermal_contacts_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
-      !> Maximum number of breaks, and of attachments
       integer, intent(in) :: limit
-      !> The schedule; at its end if there is none
       type(schedule_type), intent(inout) :: schedule
 
       call self%follow_motion(pose)
@@ -131,15 +101,11 @@ contains
       end if
    end subroutine plan
 
-   !> The same by clocks: until a contact breaks, attaches or bears no force.
-   subroutine offer_activated(self, pose, law, window)
-      !> The contacts
-      class(contact_activated_type), intent(inout) :: self
-      !> Pose of the slider
+   !> The same with clocks.
+   subroutine offer_by_clocks(self, pose, law, window)
+      class(thermal_contacts_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
-      !> The law
       type(interface_law_type), intent(out) :: law
-      !> Range in which it holds
       type(window_type), intent(out) :: window
 
       real(wp) :: ahead
@@ -150,26 +116,24 @@ contains
       call self%set_next()
       call self%hazard%offer(pose%displacement, self%clock)
       call self%hazard%limit_window(window)
-   end subroutine offer_activated
+   end subroutine offer_by_clocks
 
    !> Break all contacts that are due, then attach those that are, in the order in which they broke.
-   subroutine respond_activated(self, before, after)
-      !> The contacts
-      class(contact_activated_type), intent(inout) :: self
-      !> Pose of the slider before the motion, and after it
+   subroutine respond(self, before, after)
+      class(thermal_contacts_type), intent(inout) :: self
       type(pose_type), intent(in) :: before, after
 
       if (self%is_steady) then
          call self%respond_steadily(after)
-         return
+      else
+         call self%hazard%advance(self%clock)
+         call self%break_and_attach(after)
       end if
-      call self%hazard%advance(self%clock)
-      call self%respond_here(after)
-   end subroutine respond_activated
+   end subroutine respond
 
    !> Break and attach contacts in a uniform motion.
    subroutine respond_steadily(self, pose)
-      class(contact_activated_type), intent(inout) :: self
+      class(thermal_contacts_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
 
       real(wp) :: breaks
@@ -177,7 +141,7 @@ contains
 
       breaks = self%breaks
       do
-         call self%find_due(pose, contact)
+         call self%order(self%ahead)%due(self%direction * pose%displacement, contact)
          if (contact == 0) exit
          call self%break_contact(contact, pose)
       end do
@@ -185,9 +149,9 @@ contains
       call self%attach_due(pose)
    end subroutine respond_steadily
 
-   !> Break and attach contacts where the slider is.
-   subroutine respond_here(self, pose)
-      class(contact_activated_type), intent(inout) :: self
+   !> Break and attach all contacts that are due where the slider is.
+   subroutine break_and_attach(self, pose)
+      class(thermal_contacts_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
 
       real(wp) :: breaks
@@ -195,21 +159,21 @@ contains
 
       breaks = self%breaks
       do number = 1, clocks
-         call self%break_activated(number, pose)
+         call self%break_by_clock(number, pose)
       end do
-      call self%turn_round(pose%displacement)
+      call self%reverse_if_due(pose%displacement)
       call self%pass_ahead(pose)
-      call self%renew_due(pose)
+      call self%update_bounds(pose)
       if (self%breaks > breaks) self%track%generation = self%track%generation + 1
       do number = 1, clocks
          call self%move_reference(number, pose%displacement)
       end do
       call self%attach_due(pose)
-   end subroutine respond_here
+   end subroutine break_and_attach
 
-   !> Break the contacts whose keys a clock has come to.
-   subroutine break_activated(self, number, pose)
-      class(contact_activated_type), intent(inout) :: self
+   !> Break the contacts whose keys a clock has reached.
+   subroutine break_by_clock(self, number, pose)
+      class(thermal_contacts_type), intent(inout) :: self
       integer, intent(in) :: number
       type(pose_type), intent(in) :: pose
 
@@ -219,14 +183,13 @@ contains
       do
          call self%order(motions + number)%due(self%hazard%reading(number), contact)
          if (contact == 0) return
-         if (self%confirms(contact, pose, .true.)) call self%break_contact(contact, pose)
+         if (self%accepts_break(contact, pose, .true.)) call self%break_contact(contact, pose)
       end do
-   end subroutine break_activated
+   end subroutine break_by_clock
 
-   !> Let contacts respond to a motion ahead: they break at their thresholds, or their forces change
-   !> their signs.
+   !> Let all events ahead happen: contacts break at their thresholds, or their forces change sign.
    subroutine pass_ahead(self, pose)
-      class(contact_activated_type), intent(inout) :: self
+      class(thermal_contacts_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
 
       integer :: contact
@@ -236,15 +199,14 @@ contains
          if (contact == 0) return
          if (force_sign(int(self%life(life_clock, contact))) * self%direction < 0.0_wp) then
             call self%change_sign(contact)
-         else if (self%confirms(contact, pose, .false.)) then
+         else if (self%accepts_break(contact, pose, .false.)) then
             call self%break_contact(contact, pose)
          end if
       end do
    end subroutine pass_ahead
 
-   !> A contact breaks.
    subroutine break_contact(self, contact, pose)
-      class(contact_activated_type), intent(inout) :: self
+      class(thermal_contacts_type), intent(inout) :: self
       integer, intent(in) :: contact
       type(pose_type), intent(in) :: pose
 
@@ -253,13 +215,10 @@ contains
       self%life(:life_key, contact) = 0.0_wp
    end subroutine break_contact
 
-   !> Give a contact that has attached a deviate and a place in each order.
+   !> Draw the deviate of a contact that has attached, and insert it.
    subroutine join(self, contact, pose)
-      !> The contacts
-      class(contact_activated_type), intent(inout) :: self
-      !> Number of the contact
+      class(thermal_contacts_type), intent(inout) :: self
       integer, intent(in) :: contact
-      !> Pose of the slider
       type(pose_type), intent(in) :: pose
 
       real(wp) :: stretch
@@ -277,18 +236,14 @@ contains
       number = merge(1, 2, stretch > 0.0_wp)
       self%life(life_clock, contact) = real(number, wp)
       self%life(life_key, contact) = never
-      call self%prepare(contact, pose)
+      call self%begin_life(contact, pose)
       call self%move_reference(number, pose%displacement)
       call self%put(contact)
    end subroutine join
 
-   !> Keep the books of a schedule.
    subroutine settle(self, schedule, pose)
-      !> The contacts
-      class(contact_activated_type), intent(inout) :: self
-      !> The schedule, as far as the slider came; a moment in which contacts broke may be added
+      class(thermal_contacts_type), intent(inout) :: self
       type(schedule_type), intent(inout) :: schedule
-      !> Pose of the slider
       type(pose_type), intent(in) :: pose
 
       real(wp) :: breaks
@@ -297,68 +252,47 @@ contains
       if (self%is_steady) then
          call self%settle_steadily(schedule)
          if (schedule%is_over) call self%attach_due(pose)
-         self%detached_count = real(self%detached%count, wp)
-         return
-      end if
-      call self%settle_lists(schedule)
-      if (schedule%is_over) then
-         breaks = self%breaks
-         call self%respond_here(pose)
-         if (self%breaks > breaks .and. .not. schedule%breaks_now) then
-            schedule%moments = schedule%moments + 1
-         end if
       else
-         number = clocks + 1 - schedule%number
-         if (self%members(number) == 0) call self%move_reference(number, pose%displacement)
+         call self%settle_lists(schedule)
+         if (schedule%is_over) then
+            breaks = self%breaks
+            call self%break_and_attach(pose)
+            if (self%breaks > breaks .and. .not. schedule%breaks_now) then
+               schedule%moments = schedule%moments + 1
+            end if
+         else
+            number = clocks + 1 - schedule%number
+            if (self%members(number) == 0) call self%move_reference(number, pose%displacement)
+         end if
       end if
       self%detached_count = real(self%detached%count, wp)
    end subroutine settle
 
-   !> Prepare the life of a contact that has attached: nothing unless a kind has more to prepare.
-   subroutine prepare(self, contact, pose)
-      !> The contacts
-      class(contact_activated_type), intent(inout) :: self
-      !> Number of the contact
+   !> What a kind adds to the life of a contact that has attached: nothing here.
+   subroutine begin_life(self, contact, pose)
+      class(thermal_contacts_type), intent(inout) :: self
       integer, intent(in) :: contact
-      !> Pose of the slider
       type(pose_type), intent(in) :: pose
 
-   end subroutine prepare
+   end subroutine begin_life
 
-   !> Whether a contact breaks that has come to its threshold, or its clock to its key: it does
-   !> unless these were bounds.
-   function confirms(self, contact, pose, by_clock)
-      !> The contacts
-      class(contact_activated_type), intent(inout) :: self
-      !> Number of the contact
+   !> Whether a contact breaks that has reached its limit, or its key: always, unless these are
+   !> bounds.
+   function accepts_break(self, contact, pose, by_clock)
+      class(thermal_contacts_type), intent(inout) :: self
       integer, intent(in) :: contact
-      !> Pose of the slider
       type(pose_type), intent(in) :: pose
-      !> Whether it is the clock
       logical, intent(in) :: by_clock
-      !> Whether it breaks
-      logical :: confirms
+      logical :: accepts_break
 
-      confirms = .true.
-   end function confirms
+      accepts_break = .true.
+   end function accepts_break
 
-   !> Take note of what has changed with the time alone: nothing unless thresholds do.
-   subroutine renew_due(self, pose)
-      !> The contacts
-      class(contact_activated_type), intent(inout) :: self
-      !> Pose of the slider
+   !> Update limits that have changed with the time: none here.
+   subroutine update_bounds(self, pose)
+      class(thermal_contacts_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
 
-   end subroutine renew_due
+   end subroutine update_bounds
 
-   !> Put the state into an archive or take it out.
-   subroutine exchange(self, archive)
-      !> The contacts
-      class(contact_activated_type), intent(inout) :: self
-      !> The archive
-      type(archive_type), intent(inout) :: archive
-
-      call exchange_activated(self, archive)
-   end subroutine exchange
-
-end module mesoslip_contacts_activated_contacts
+end module mesoslip_contacts_thermal_contacts

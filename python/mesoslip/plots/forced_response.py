@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 
-from mesoslip.analysis.experiment import Experiment
+from mesoslip.analysis.experiment_stages import Experiment
 from mesoslip.analysis.response import creep_line, friction_line, response_of
 from mesoslip.configuration.config import Config
 from mesoslip.output.arrays import Arrays, Tree

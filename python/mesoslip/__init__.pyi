@@ -1,10 +1,10 @@
 from .analysis.avalanches import avalanche_summary, avalanches
+from .analysis.catalogue_tables import write_table
 from .analysis.export import export
 from .analysis.lyapunov import lyapunov
 from .analysis.regime import regime
 from .analysis.response import response
 from .analysis.slips import slips
-from .analysis.tables import write_table
 from .api import run
 from .campaign.mean_field import mean_field
 from .campaign.sweep import sweep

@@ -259,7 +259,7 @@ def test_all_sizes_are_tested(monkeypatch):
     fit = fit_power_law(sizes, 1, replicas=50)
     assert fit.is_rejected
     assert fit.tested == len(sizes)
-    monkeypatch.setattr(power_law, "TEST_SIZES", 20_000)
+    monkeypatch.setattr(power_law, "MAX_TESTED", 20_000)
     fit = fit_power_law(sizes, 1, replicas=50)
     assert fit.p_value > 0.1
     assert fit.tested == 20_000

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from mesoslip.analysis import response as responses
-from mesoslip.analysis.experiment import Experiment
+from mesoslip.analysis.experiment_stages import Experiment
 from mesoslip.analysis.rate_and_state import (
     Loading,
     RateAndState,

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
-from mesoslip.analysis.experiment import Experiment
+from mesoslip.analysis.experiment_stages import Experiment
 from mesoslip.analysis.rate_and_state import measured_rows
 from mesoslip.measured.load_point import drive_stages, stage_table
 from scipy.integrate import solve_ivp

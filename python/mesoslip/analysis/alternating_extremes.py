@@ -2,7 +2,8 @@
 
 A pair of neighbouring extremes whose difference is not larger than those on both sides is a cycle
 within a larger one, as in the counting of rainflow cycles (Matsuishi & Endo 1968; the persistence
-of topology is the same). Without all cycles below a threshold the other extremes differ by it.
+of topology is the same). When all cycles below a threshold are removed, the other extremes differ
+by more than the threshold.
 """
 
 from __future__ import annotations
@@ -16,29 +17,20 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Samples = NDArray[np.int_]
 
-# Turning points from which on cycles are found one by one.
+# Number of turning points below which cycles are found one by one.
 MIN_POINTS = 100
 
 
 @dataclass(frozen=True)
 class Extremes:
-    """The extremes of a trace.
-
-    Attributes
-    ----------
-    values
-        The trace, shape (samples,).
-    first, second
-        Samples of the extremes of each closed cycle, shape (cycles,).
-    rest
-        Samples of the extremes that close no cycle, in their order; the first and the last sample
-        of the trace are among them.
-    """
+    """The extremes of a trace of shape (samples,)."""
 
     values: Array
     first: Samples
     second: Samples
+    """Samples of the extremes of each closed cycle, as ``first``, shape (cycles,)."""
     rest: Samples
+    """Samples of the extremes that close no cycle, in their order, with the first and the last."""
 
     @cached_property
     def _cycle_sizes(self) -> Array:
@@ -47,7 +39,7 @@ class Extremes:
 
     @cached_property
     def fall_sizes(self) -> Array:
-        """Sizes of all falls, in ascending order: those above a threshold are its falls."""
+        """Sizes of all falls, in ascending order."""
         steps = np.diff(self.values[self.rest])
         return np.sort(np.concatenate([self._cycle_sizes, -steps[steps < 0]]))
 
@@ -57,7 +49,7 @@ class Extremes:
         Between neighbouring falls the trace rises by more than the threshold as well.
         """
         kept = self._cycle_sizes > threshold
-        # Differences of the rest grow, and then shrink.
+        # Differences of the rest increase, then decrease.
         large = np.flatnonzero(np.abs(np.diff(self.values[self.rest])) > threshold)
         rest = self.rest[large[0] : large[-1] + 2] if large.size else self.rest[:0]
         extremes = np.sort(np.concatenate([self.first[kept], self.second[kept], rest]))
@@ -66,13 +58,7 @@ class Extremes:
 
 
 def extremes_of(values: Array) -> Extremes:
-    """The extremes of a trace, in a time proportional to its length.
-
-    Parameters
-    ----------
-    values
-        Samples, shape (samples,).
-    """
+    """The extremes of a trace of shape (samples,), in a time proportional to its length."""
     at, inner = _without_inner_cycles(values, _turning_points(values))
     levels = values[at].tolist()
     stack: list[int] = []
@@ -91,14 +77,9 @@ def extremes_of(values: Array) -> Extremes:
 
 
 def _without_inner_cycles(values: Array, at: Samples) -> tuple[Samples, Samples]:
-    """Turning points without the cycles of neighbours that differ less than those on both sides.
+    """Turning points without cycles of neighbours, and these cycles, shape (cycles, 2).
 
     Such pairs have no point in common, and each pass removes most points of a noisy trace.
-
-    Returns
-    -------
-    at, cycles
-        The turning points that are left, and the pairs of samples, shape (cycles, 2).
     """
     found = [np.empty((0, 2), dtype=int)]
     while at.size > MIN_POINTS:

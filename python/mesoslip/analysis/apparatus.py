@@ -1,6 +1,6 @@
 """Known properties of the apparatus behind an output: its force, spring, period and drive.
 
-The output of a run has its whole configuration. A measured trace may have no more than a friction
+The output of a run has its whole configuration. A measured trace may have only a friction
 coefficient and the displacement of a load point.
 """
 
@@ -13,49 +13,34 @@ from typing import Any
 
 import numpy as np
 
-from mesoslip.analysis.even_traces import first_velocity
 from mesoslip.configuration.config import Config
 from mesoslip.configuration.units import to_si
 from mesoslip.errors import ConfigError, FileError
 from mesoslip.output.access import group_of, is_measured
 from mesoslip.output.arrays import Tree
 
-# Variables that hold the force of an output, the first that is there, and their units.
+# Variables for the force of an output, in order of preference, and their units.
 FORCES = {"spring_force": "N", "friction_coefficient": "1"}
-# Units of the stiffness that belong to them, with examples.
+# Units of the stiffness by the unit of the force, with examples.
 STIFFNESSES = {"N": ("N/m", "97 N/m"), "1": ("1/m", "1.6e-3 1/um")}
 
 
 @dataclass(frozen=True)
 class Apparatus:
-    """Known properties of an apparatus.
-
-    Attributes
-    ----------
-    force_name
-        Variable of the output with the force: "spring_force" or "friction_coefficient".
-    force_unit
-        Its unit, "N" or "1".
-    stiffness
-        Stiffness of the spring, unit of the force per metre; infinite for a prescribed slider, NaN
-        if unknown.
-    period
-        Period of the setup [s]; NaN if it is unknown or the slider has no inertia.
-    velocity
-        First velocity of the drive that is not 0 [m/s]; NaN if unknown, 0 without a drive. Of a
-        drive by force: its rate [N/s].
-    direction
-        Sign of the velocity, +1 if unknown.
-    config
-        The configuration of a run or of the whole experiment; None if it is not known.
-    """
+    """Known properties of an apparatus."""
 
     force_name: str
+    """Variable of the output with the force, see `FORCES`."""
     force_unit: str
     stiffness: float
+    """Unit of the force per metre; infinite for a prescribed slider, NaN if unknown."""
     period: float
+    """Period of the setup [s]; NaN if it is unknown or the slider has no inertia."""
     velocity: float
+    """First nonzero velocity of the drive [m/s], or rate of its force [N/s]; NaN if unknown, 0
+    without a drive."""
     config: Config | None
+    """Configuration of a run or of the whole experiment; None if unknown."""
 
     @property
     def direction(self) -> float:
@@ -64,20 +49,7 @@ class Apparatus:
 
 
 def apparatus_of(tree: Tree, name: str = "the output") -> Apparatus:
-    """Properties of the apparatus according to an output.
-
-    Parameters
-    ----------
-    tree
-        Output of a run, or a measured trace.
-    name
-        Name in messages.
-
-    Raises
-    ------
-    FileError
-        If it has no force, or it is a run and its configuration is not one.
-    """
+    """Properties of the apparatus according to an output; ``name`` is that in messages."""
     force = next((one for one in FORCES if one in tree.data_vars), None)
     if force is None:
         raise FileError(f"{name}: is neither the output of a run nor a measured trace")
@@ -103,6 +75,19 @@ def apparatus_of(tree: Tree, name: str = "the output") -> Apparatus:
     return Apparatus(force, unit, stiffness, period, velocity, None)
 
 
+def first_velocity(config: Config) -> float:
+    """The first nonzero velocity of the drive [m/s], or rate of its force [N/s]; 0 for none."""
+    parts = config.drive_parts
+    velocities = (one for part in parts for one in (part.start_velocity, part.end_velocity))
+    return next((one for one in velocities if one), 0.0)
+
+
+def with_force_unit(units: str, force_unit: str) -> str:
+    """CF units of a force in newtons, or of a friction coefficient if the force unit is "1"."""
+    first, _, others = units.partition(" ")
+    return others or "1" if force_unit == "1" and first == "N" else units
+
+
 def _config(tree: Tree, name: str) -> Config | None:
     """The whole configuration; None for a measured trace with a part of it."""
     try:
@@ -114,7 +99,7 @@ def _config(tree: Tree, name: str) -> Config | None:
 
 
 def _known(tables: dict[str, Any], key: tuple[str, str], unit: str, example: str) -> float:
-    """A key of the known part of a configuration in SI; NaN without it."""
+    """The value of a key in SI; NaN without it."""
     value = tables.get(key[0], {}).get(key[1])
     if value is None:
         return math.nan
@@ -122,7 +107,7 @@ def _known(tables: dict[str, Any], key: tuple[str, str], unit: str, example: str
 
 
 def _driven_velocity(tree: Tree) -> float:
-    """First velocity of the recorded stages that is not 0, or the mean one of the load point."""
+    """First nonzero velocity of the recorded stages, or mean velocity of the load point [m/s]."""
     if "stages" in tree.children:
         data = group_of(tree, "stages")
         both = [data[f"drive_{one}_velocity"].values for one in ("start", "end")]

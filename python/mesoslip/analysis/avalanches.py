@@ -30,7 +30,7 @@ NO_AVALANCHES = (
     'slider.kind = "quasistatic"'
 )
 
-# Name: unit, meaning.
+# Statistics: unit, meaning.
 SUMMARY = {
     "count": ("1", "avalanches in the catalogue"),
     "breaks": ("1", "breaks of contacts in them"),
@@ -84,7 +84,7 @@ SUMMARY = {
     "stretched_exponential_ratio": ("1", "log-likelihood of the law over a stretched exponential"),
     "stretched_exponential_p_value": ("1", "probability of such a ratio if both are as good"),
 }
-# Sizes in a window whose local exponent is reported.
+# Minimum number of sizes in a window whose local exponent is reported.
 MIN_LOCAL_COUNT = 50
 
 
@@ -232,13 +232,13 @@ def warning(statistics: dict[str, float | None]) -> str | None:
 
 
 def failures(tree: xr.DataTree, data: xr.Dataset) -> NDArray[np.bool_]:
-    """Which avalanches broke all remaining contacts; no law of sizes describes them."""
+    """Whether each avalanche broke all remaining contacts; these follow no law of sizes."""
     config = Config.from_toml(tree.attrs["configuration"])
     if config.contacts.reattach:
         return np.zeros(data.sizes["avalanche"], dtype=bool)
     everything = group_of(tree, "avalanches")
     last = np.full(tree.sizes["realization"], np.inf)
-    # Rows are in the order of time, so that the last one of each realization stays.
+    # Rows are in the order of time, so that the last one of each realization is kept.
     last[everything["realization_index"].values] = everything["start_time"].values
     is_last = data["start_time"].values == last[data["realization_index"].values]
     is_broken = tree.to_dataset()["breaks"].values == config.contacts.count
@@ -254,13 +254,7 @@ def rows(data: xr.Dataset) -> list[dict[str, Any]]:
 
 
 def write_csv(data: xr.Dataset, path: Path) -> None:
-    """Write avalanches as a table with the units in its header.
-
-    Raises
-    ------
-    FileError
-        If it cannot be written.
-    """
+    """Write avalanches as a table with the units in its header."""
     units = {name: data[name].attrs.get("units", "1") for name in _columns(data)}
     write_table(rows(data), units, path)
 

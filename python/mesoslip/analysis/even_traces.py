@@ -1,4 +1,4 @@
-"""Traces at equal intervals, and the initial velocity of the drive."""
+"""Traces at equal intervals."""
 
 from __future__ import annotations
 
@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     import xarray as xr
 
-    from mesoslip.configuration.config import Config
-
 Array = NDArray[np.float64]
 
 # Maximum relative difference of intervals that count as equal.
@@ -20,10 +18,7 @@ INTERVAL_TOLERANCE = 1e-3
 
 
 def even_trace(tree: xr.DataTree, realization: int = 0) -> tuple[Array, Array]:
-    """Times [s] and spring force [N] of a trace at equal intervals.
-
-    Forces at unequal intervals are interpolated linearly.
-    """
+    """Times [s] and spring force [N] of a realization; see `evenly_sampled`."""
     root = tree.to_dataset()
     time = root["time"].values
     force = root["spring_force"].values[realization].astype(float)
@@ -39,10 +34,3 @@ def evenly_sampled(time: Array, values: Array) -> tuple[Array, Array]:
         return time, values
     even = time[0] + interval * np.arange(math.floor((time[-1] - time[0]) / interval) + 1)
     return even, np.interp(even, time, values)
-
-
-def first_velocity(config: Config) -> float:
-    """The first nonzero velocity of the drive [m/s], or rate of its force [N/s]; 0 for none."""
-    parts = config.drive_parts
-    velocities = (one for part in parts for one in (part.start_velocity, part.end_velocity))
-    return next((one for one in velocities if one), 0.0)

@@ -1,12 +1,12 @@
 """The largest Lyapunov exponent of a run, from twins that start a small distance away.
 
-A twin goes on from the state of the run, with the same random numbers, after its drive was
+A twin continues from the state of the run, with the same random numbers, after its drive was
 displaced by a small distance. The distance of both grows as exp(λt) until it is as large as the
-motion itself, or decays until rounding and steps hide it. Nothing is renormalized:
-the run is compared with a new twin at each of several times, which brings both together again.
+motion itself, or decays until rounding and steps hide it. Nothing is renormalized: the run is
+compared with a new twin from each of several times on.
 
-A displacement along the motion neither grows nor decays, and does not count: in each window of time
-the shift in time that leaves the least difference is taken off.
+A displacement along the motion neither grows nor decays. So in each window of time the shift in
+time is removed that minimizes the difference.
 """
 
 from __future__ import annotations
@@ -37,53 +37,44 @@ Array = NDArray[np.float64]
 
 # Kinds of sliders with inertia and a spring, whose drive can be displaced.
 SLIDERS = ("rigid", "layered")
-# Periods of the setup in a window in which distances are measured.
+# Periods of the setup in a window in which distances are measured, and minimum number of samples.
 WINDOW_PERIODS = 1
-# Samples that a window has at least.
 MIN_SAMPLES = 16
 # Windows after which the distance has turned to the direction that grows most.
 SETTLING_WINDOWS = 3
-# Windows for which a twin is followed at least: one step of growth.
+# Minimum number of windows of a twin: one step of growth.
 MIN_WINDOWS = SETTLING_WINDOWS + 2
 # Distance up to which growth is linear, over the amplitude of the motion.
 MAX_DISTANCE = 0.1
-# Parts of the run before the first twin, and in which each is followed.
-TRANSIENT, FOLLOWED = 0.3, 0.3
-# Displacement of a twin's drive over F_s/K. In the master equation it is well above the floor of
+# Part of the run before the first twin, and duration of a twin over that of the run.
+TRANSIENT, TWIN_DURATION = 0.3, 0.3
+# Displacement of a twin's drive over F_s/K. In the master equation it is well above the errors of
 # steps and rounding; N contacts break one by one, and only distances above 1/N grow smoothly.
 DISPLACEMENT = 1e-10
-# Distances from which N contacts are fitted, times N.
+# Minimum distance that is fitted with N contacts, times N.
 DISCRETE_DISTANCES = 10.0
-# Units and meanings of what is printed.
+# Units and meanings of the printed values.
 SUMMARY = {
     name: (LYAPUNOV[name].units, LYAPUNOV[name].long_name)
     for name in ("lyapunov_exponent", "lyapunov_error", "min_distance", "max_distance")
 }
-# Standard errors by which an exponent must be positive to be called so.
+# Minimum size of an exponent that is positive or negative, in standard errors.
 SIGNIFICANCE = 3.0
 
 
 class Fit(NamedTuple):
-    """A mean rate of growth."""
+    """A mean rate of growth [1/s], NaN if nothing could be fitted, and its standard error."""
 
     exponent: float
-    """Rate [1/s]; NaN if nothing could be fitted."""
     error: float
-    """Its standard error, from the scatter of the twins [1/s]."""
 
 
 @dataclass(frozen=True)
 class Orbit:
     """Samples of a motion at equal intervals, in units of F_s and of the slip velocity Ω_S F_s/K.
 
-    Attributes
-    ----------
-    time
-        Times [s], shape (samples).
-    position
-        Spring force and velocity of the slider, shape (samples, 2).
-    rate
-        Their derivatives [1/s], shape (samples, 2).
+    ``position`` is spring force and velocity of the slider, shape (samples, 2), ``rate`` their
+    derivatives [1/s].
     """
 
     time: Array
@@ -92,7 +83,7 @@ class Orbit:
 
     @classmethod
     def of_trace(cls, trace: Array, config: Config) -> Orbit:
-        """That of a trace with the columns of a run."""
+        """The motion of a trace with the columns of a run."""
         index = [TRACE_COLUMNS.index(one) for one in ("time", "spring_force", "velocity")]
         time, force, velocity = trace[:, index].T
         static, spring = config.contacts.static_force, config.spring_stiffness
@@ -112,23 +103,10 @@ class Orbit:
 
 
 def transverse_distances(one: Orbit, other: Orbit, window: int) -> tuple[Array, Array]:
-    """Distance of two motions in windows of time, but for a shift in time.
+    """Middles [s] of windows of samples, and the distance of two motions in them.
 
-    Parameters
-    ----------
-    one
-        A motion.
-    other
-        The other, sampled at some of the same times.
-    window
-        Samples in a window.
-
-    Returns
-    -------
-    times
-        Middles of the windows [s], shape (windows).
-    distances
-        Root mean square distance in each window less the time shift that leaves the least of it.
+    This is the root mean square distance at the shift in time for which it is minimal. The other
+    motion has some of the times of the first.
     """
     interval = float(np.median(np.diff(one.time)))
     first = round((other.time[0] - one.time[0]) / interval)
@@ -140,31 +118,18 @@ def transverse_distances(one: Orbit, other: Orbit, window: int) -> tuple[Array, 
     difference = difference[: windows * window].reshape(shape)
     rate = rate[: windows * window].reshape(shape)
     shift = np.sum(difference * rate, axis=1) / np.sum(rate**2, axis=1)
-    left = difference - shift[:, np.newaxis] * rate
+    transverse = difference - shift[:, np.newaxis] * rate
     times = one.time[first : first + windows * window].reshape(windows, window).mean(axis=1)
-    return times, np.sqrt(np.sum(left**2, axis=1) / window)
+    return times, np.sqrt(np.sum(transverse**2, axis=1) / window)
 
 
 def growth(times: Array, distances: Array, low: float, high: float) -> tuple[float, float]:
-    """Growth of a distance while it is between two bounds.
+    """Growth of the logarithm of a distance from one bound to the other, and its duration [s].
 
     Both ends are first passages: the first distance in the range, and the first one beyond it,
-    which counts. Without that last step, of the size of the growth in a slip, the rate
-    would come out too small, the more so the narrower the range.
-
-    Parameters
-    ----------
-    times
-        Times since the start [s], shape (windows).
-    distances
-        Distances, shape (windows).
-    low, high
-        The range.
-
-    Returns
-    -------
-    Growth of the logarithm, and the time that it took [s]; both 0 if the distance is never in the
-    range, or only at the end.
+    which is included. Without that last step, of the size of the growth in a slip, the rate would
+    be too small, the more so the narrower the range. Both results are 0 if the distance is never in
+    the range, or only at the end.
     """
     late = slice(SETTLING_WINDOWS, None)
     time, distance = times[late], distances[late]
@@ -178,24 +143,15 @@ def growth(times: Array, distances: Array, low: float, high: float) -> tuple[flo
 
 
 def _first(condition: NDArray[np.bool_]) -> int:
-    """Index of the first that is true; their number if none is."""
+    """Index of the first true element; the number of elements without one."""
     return int(np.argmax(condition)) if condition.any() else len(condition)
 
 
 def pooled(grown: Array, lengths: Array, starts: Array) -> Fit:
-    """Growth of several twins over the time that it took, and its error.
+    """Growth of twins over the durations [s] of the growth, for starts [s] in ascending order.
 
     The error is that of a ratio, from the scatter of the twins. Twins that follow the same part of
     a run are not independent: they count as one in the time that they share.
-
-    Parameters
-    ----------
-    grown
-        Growth of the logarithm of each distance, shape (twins).
-    lengths
-        Times that it took [s], shape (twins).
-    starts
-        When the twins started [s], ascending, shape (twins).
     """
     known = lengths > 0
     grown, lengths, starts = grown[known], lengths[known], starts[known]
@@ -228,15 +184,15 @@ def lyapunov(
     realization
         Number of the realization.
     twins
-        Number of twins, at least 2; they start at equal intervals after `TRANSIENT` of the run.
+        Number of twins, at least 2; they start at equal intervals after 30 % of the run.
     duration
-        Time for which each is followed [s]; by default `FOLLOWED` of the run.
+        Duration of each twin [s]; by default 30 % of that of the run.
     displacement
         Displacement of a twin's drive over F_s/K.
     executor
         Where twins are computed: threads.
     progress
-        Called repeatedly with the fraction of the work that is done, 0 to 1.
+        Called repeatedly with the finished fraction of the work, 0 to 1.
 
     Returns
     -------
@@ -257,7 +213,7 @@ def lyapunov(
     checked = as_config(config)
     _check(checked, twins, displacement)
     end = checked.duration
-    span = min(duration or FOLLOWED * end, (1 - TRANSIENT) * end)
+    span = min(duration or TWIN_DURATION * end, (1 - TRANSIENT) * end)
     starts = np.linspace(TRANSIENT * end, end - span, twins)
     period = 2 * checked.slider.quiet_time
     window = max(MIN_SAMPLES, round(WINDOW_PERIODS * period / checked.output_interval))
@@ -272,7 +228,7 @@ def lyapunov(
         run.advance_to(end)
         reference = Orbit.of_trace(run.trace, checked)
         peaks = run.table("slips")
-    _follow(others, span, executor, progress)
+    _advance_all(others, span, executor, progress)
     results = []
     for other, start in others:
         times, distances = transverse_distances(
@@ -287,7 +243,9 @@ def lyapunov(
         )
     times = np.stack([one[0][:windows] for one in results])
     distances = np.stack([one[1][:windows] for one in results])
-    low, high = _range(checked, reference.after(float(starts[0])).amplitude)
+    is_discrete = checked.contact_kind.is_discrete
+    low = DISCRETE_DISTANCES / checked.contacts.count if is_discrete else 0.0
+    high = MAX_DISTANCE * reference.after(float(starts[0])).amplitude
     found = [growth(*one, low, high) for one in zip(times, distances, strict=True)]
     grown, lengths = (np.array(one) for one in zip(*found, strict=True))
     fit = pooled(grown, lengths, starts)
@@ -326,13 +284,7 @@ def summary(tree: xr.DataTree) -> str:
 
 
 def _check(config: Config, twins: int, displacement: float) -> None:
-    """Refuse what has no twins.
-
-    Raises
-    ------
-    ConfigError
-        If the slider has no inertia or no spring, or an argument is not positive.
-    """
+    """Refuse sliders without inertia or spring, and arguments out of range."""
     problems = []
     if config.slider.kind not in SLIDERS:
         problems.append(
@@ -353,27 +305,13 @@ def _check(config: Config, twins: int, displacement: float) -> None:
         raise ConfigError(problems)
 
 
-def _range(config: Config, amplitude: float) -> tuple[float, float]:
-    """Distances between which growth is fitted."""
-    low = 0.0
-    if config.contact_kind.is_discrete:
-        low = DISCRETE_DISTANCES / config.contacts.count
-    return low, MAX_DISTANCE * amplitude
-
-
-def _follow(
+def _advance_all(
     twins: list[tuple[Realization, float]],
     span: float,
     executor: ExecutorLike,
     progress: Callable[[float], None] | None,
 ) -> None:
-    """Let twins go on for a time.
-
-    Raises
-    ------
-    StoppedError
-        If that was interrupted.
-    """
+    """Advance twins by a time [s]."""
     stop = Stop()
     with stop.on_interrupt():
         work = completed(

@@ -1,4 +1,4 @@
-"""Peaks of the force before slips as a sequence: the return map and its slope."""
+"""The return map of the peaks of the force before slips, and its slope."""
 
 from __future__ import annotations
 
@@ -15,27 +15,14 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-# Part of a run before the peaks that count.
+# Part of a run before the first peak of the map.
 TRANSIENT = 0.5
-# Neighbours of a point of the map from which its slope is estimated, at most this part of all.
+# Number of neighbours of a point from which the slope is estimated, and their maximum share.
 NEIGHBOURS, MAX_PART = 8, 0.1
 
 
 def settled_peaks(tree: xr.DataTree, realization: int = 0) -> Array:
-    """Spring force at the start of each slip of the second half of a run [N].
-
-    Parameters
-    ----------
-    tree
-        Output of a run.
-    realization
-        Index of the realization.
-
-    Returns
-    -------
-    numpy.ndarray
-        Shape (slips); empty if there are none.
-    """
+    """Spring force at the start of each slip of the second half of a run [N]."""
     if "slips" not in tree.children:
         return np.empty(0)
     data = group_of(tree, "slips")
@@ -48,21 +35,11 @@ def settled_peaks(tree: xr.DataTree, realization: int = 0) -> Array:
 
 
 def map_exponent(peaks: Array) -> float:
-    """Mean of ln |f'| over the return map f of peaks, were it a curve.
+    """Mean of ln |f'| over the return map f of successive peaks, as if it were a curve.
 
-    The slope at each point is that of a line through its nearest neighbours. It is the Lyapunov
-    exponent of a one-dimensional map, per peak; several branches, or noise, make it
-    larger.
-
-    Parameters
-    ----------
-    peaks
-        Successive peaks, shape (slips).
-
-    Returns
-    -------
-    float
-        The exponent per peak; NaN for fewer than a hundred peaks or for equal ones.
+    This is the Lyapunov exponent of a one-dimensional map, per peak; several branches, or noise,
+    make it larger. The slope at each point is that of a line through its nearest neighbours. NaN
+    for fewer than about a hundred peaks, or for equal ones.
     """
     x, y = peaks[:-1], peaks[1:]
     count = min(NEIGHBOURS, int(MAX_PART * x.size))

@@ -1,9 +1,9 @@
-"""The catalogue of slips of an output, and its statistics."""
+"""The catalogue of slips of an output, its statistics, and its tables."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -11,16 +11,32 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mesoslip.analysis.apparatus import Apparatus, apparatus_of
+from mesoslip.analysis.apparatus import Apparatus, apparatus_of, with_force_unit
 from mesoslip.analysis.stick_phases import stick_phases
+from mesoslip.output import table_files
 from mesoslip.output.access import group_of
 from mesoslip.output.arrays import Arrays, Tree
 from mesoslip.output.inputs import OutputLike, as_run
-from mesoslip.output.table_files import write_table
+from mesoslip.output.table_files import PrintedTable
+from mesoslip.quantities import Column as PrintedColumn
+from mesoslip.quantities import column, number
 
 if TYPE_CHECKING:
     import xarray as xr
 
+# Columns that are not in the group of an output: CF units for a force in newtons, and meaning.
+ADDED = {
+    "duration": ("s", "duration of the slip"),
+    "waiting_time": ("s", "time since the start of the slip before"),
+    "stick_duration": ("s", "time since the end of the slip before"),
+    "loading_rate": ("N s-1", "rate of the force while the slider sticks"),
+    "loading_stiffness": ("N m-1", "growth of the force over the displacement of the drive"),
+    "creep_displacement": ("m", "displacement of the slider between the slips"),
+    "creep_share": ("1", "its share of the displacement of the drive"),
+    "peak_fall_rate": ("N s-1", "maximum rate at which the force fell in the slip"),
+}
+# Those that need the trace.
+STICK_COLUMNS = tuple(ADDED)[2:]
 COLUMNS = (
     "realization_index",
     "start_time",
@@ -30,61 +46,42 @@ COLUMNS = (
     "force_drop",
     "peak_velocity",
     "contacts_broken",
-    "duration",
-    "waiting_time",
-    "stick_duration",
-    "loading_rate",
-    "loading_stiffness",
-    "creep_displacement",
-    "creep_share",
-    "peak_fall_rate",
+    *ADDED,
 )
-
-
-# Attributes of columns that the group of an output does not have, and units of those that do not
-# hang on that of the force.
-MEANINGS = {
-    "duration": "duration of the slip",
-    "waiting_time": "time since the start of the slip before",
-    "stick_duration": "time since the end of the slip before",
-    "loading_rate": "rate of the force while the slider sticks",
-    "loading_stiffness": "growth of the force over the displacement of the drive",
-    "creep_displacement": "displacement of the slider between the slips",
-    "creep_share": "its share of the displacement of the drive",
-    "peak_fall_rate": "maximum rate at which the force fell in the slip",
+# Printed columns: header, and SI unit.
+HEADS = {
+    "start_time": ("start", "s"),
+    "duration": ("duration", "s"),
+    "force_before": ("force before", "N"),
+    "force_after": ("force after", "N"),
+    "force_drop": ("force drop", "N"),
+    "peak_velocity": ("peak velocity", "m/s"),
+    "contacts_broken": ("breaks", "1"),
+    "waiting_time": ("waiting time", "s"),
+    "stick_duration": ("stick duration", "s"),
+    "loading_rate": ("loading rate", "N/s"),
+    "loading_stiffness": ("loading stiffness", "N/m"),
+    "creep_displacement": ("creep before", "m"),
+    "creep_share": ("creep share", "1"),
+    "peak_fall_rate": ("peak fall rate", "N/s"),
 }
-UNITS = {
-    "duration": "s",
-    "waiting_time": "s",
-    "stick_duration": "s",
-    "creep_displacement": "m",
-    "creep_share": "1",
-}
-# Those of them that need the trace.
-STICK_COLUMNS = tuple(MEANINGS)[2:]
-
-
+# Printed columns that have statistics only.
+STATISTICS_ONLY = {*STICK_COLUMNS} - {"creep_share"}
+# Significant digits of the largest number of a column, and of standard deviations.
+DIGITS, DEVIATION_DIGITS = 5, 2
 # Units of forces where the trace is a friction coefficient.
 COEFFICIENT_UNITS = {"N": "1", "N/s": "1/s", "N/m": "1/m"}
 
 
 def as_recorded(head: str, unit: str, force_unit: str) -> tuple[str, str]:
-    """Head and unit of a column of forces, for friction coefficients if the trace has these.
-
-    Parameters
-    ----------
-    head, unit
-        Those for forces in newtons.
-    force_unit
-        Unit of the trace, "N" or "1".
-    """
+    """Head and unit of a column of forces, or of friction coefficients if the force unit is "1"."""
     if force_unit != "1":
         return head, unit
     return head.replace("force", "friction"), COEFFICIENT_UNITS.get(unit, unit)
 
 
 class Column(NamedTuple):
-    """A column of a catalogue: values of shape (slips,) in SI, their unit, and what they are."""
+    """A column of a catalogue: values of shape (slips,) in SI, CF units, and meaning."""
 
     values: NDArray[Any]
     unit: str
@@ -93,15 +90,7 @@ class Column(NamedTuple):
 
 @dataclass(frozen=True)
 class Catalogue:
-    """The catalogue of slips of an output.
-
-    Attributes
-    ----------
-    columns
-        The columns `COLUMNS` by name, see `slips`.
-    force_unit
-        Unit of the force, "N", or "1" of a friction coefficient.
-    """
+    """The columns `COLUMNS` of the slips of an output; the force unit is "N" or "1"."""
 
     columns: Mapping[str, Column]
     force_unit: str
@@ -139,14 +128,54 @@ class Catalogue:
         return result
 
     def write_csv(self, path: Path) -> None:
-        """Write the catalogue as a table with the units in its header.
+        """Write the catalogue as a table with the units in its header."""
+        table_files.write_table(
+            self.rows, {name: self.columns[name].unit for name in COLUMNS}, path
+        )
 
-        Raises
-        ------
-        FileError
-            If it cannot be written.
-        """
-        write_table(self.rows, {name: self.columns[name].unit for name in COLUMNS}, path)
+    def printed(self) -> PrintedTable:
+        """The slips as a table for print, a row for each, each column in one unit."""
+        rows = self.rows
+        columns = [
+            (shown.head(head), *(shown.text(row[name]) for row in rows))
+            for name, head, shown in self._printed_columns()
+            if name not in STATISTICS_ONLY
+        ]
+        if any(row["realization_index"] for row in rows):
+            columns.insert(0, ("realization", *(str(row["realization_index"]) for row in rows)))
+        head, *cells = zip(*columns, strict=True)
+        return PrintedTable("Slips", head, tuple(cells))
+
+    def printed_statistics(self) -> PrintedTable:
+        """Mean, standard deviation and range of each column as a table for print."""
+        statistics = self.statistics
+        rows = tuple(
+            (shown.head(head), *_statistics(statistics[name], shown.scale.size))
+            for name, head, shown in self._printed_columns()
+            if name in statistics
+        )
+        head = ("", "mean", "standard deviation", "minimum", "maximum")
+        return PrintedTable("Statistics of slips", head, rows)
+
+    def _printed_columns(self) -> Iterator[tuple[str, str, PrintedColumn]]:
+        """Name, header and number format of each column that has a known value."""
+        rows = self.rows
+        for name, heading in HEADS.items():
+            values = [row[name] for row in rows]
+            if rows and all(one is None for one in values):
+                continue
+            head, unit = as_recorded(*heading, self.force_unit)
+            yield name, head, column(values, unit, DIGITS)
+
+
+def _statistics(values: Mapping[str, float], unit: float) -> tuple[str, ...]:
+    """Numbers with the decimals that their standard deviation deserves."""
+    names = ("mean", "standard_deviation", "minimum", "maximum")
+    mean, deviation, low, high = (values[name] / unit for name in names)
+    if not low < high:
+        return (number(mean, DIGITS), "-", "-", "-")
+    decimals = max(0, DEVIATION_DIGITS - 1 - math.floor(math.log10(deviation)))
+    return tuple(f"{one:.{decimals}f}" for one in (mean, deviation, low, high))
 
 
 def catalogue_of(tree: Tree) -> Catalogue:
@@ -157,39 +186,33 @@ def catalogue_of(tree: Tree) -> Catalogue:
     if start.size:
         waiting[np.diff(owners, prepend=-1) != 0] = np.nan
     apparatus = apparatus_of(tree)
-    unit = apparatus.force_unit
-    units = dict.fromkeys(("force_before", "force_after", "force_drop"), unit) | {
-        "loading_rate": _over(unit, "s"),
-        "loading_stiffness": _over(unit, "m"),
-        "peak_fall_rate": _over(unit, "s"),
+    added = {
+        "duration": data["end_time"].values - start,
+        "waiting_time": waiting,
+        **_stick_columns(tree, data, apparatus),
     }
-    duration = data["end_time"].values - start
-    added = dict(
-        zip(MEANINGS, (duration, waiting, *_stick_columns(tree, data, apparatus)), strict=True)
+    columns = {
+        name: Column(added[name], *ADDED[name]) if name in added else _column(data, name)
+        for name in COLUMNS
+    }
+    unit = apparatus.force_unit
+    return Catalogue(
+        {name: one._replace(unit=with_force_unit(one.unit, unit)) for name, one in columns.items()},
+        unit,
     )
-    columns = {}
-    for name in COLUMNS:
-        if name in added:
-            given = units.get(name, UNITS.get(name, "1"))
-            columns[name] = Column(added[name], given, MEANINGS[name])
-        else:
-            attributes = data[name].attrs
-            given = units.get(name, attributes.get("units", "1"))
-            columns[name] = Column(data[name].values, given, attributes.get("long_name", name))
-    return Catalogue(columns, unit)
 
 
 def catalogue_from(data: xr.Dataset) -> Catalogue:
     """The catalogue that `slips` returned."""
-    columns = {
-        name: Column(
-            data[name].values,
-            data[name].attrs.get("units", "1"),
-            data[name].attrs.get("long_name", name),
-        )
-        for name in COLUMNS
-    }
+    columns = {name: _column(data, name) for name in COLUMNS}
     return Catalogue(columns, columns["force_drop"].unit)
+
+
+def _column(data: xr.Dataset | Arrays, name: str) -> Column:
+    attributes = data[name].attrs
+    return Column(
+        data[name].values, attributes.get("units", "1"), attributes.get("long_name", name)
+    )
 
 
 def slips(output: OutputLike) -> xr.Dataset:
@@ -219,7 +242,7 @@ def slips(output: OutputLike) -> xr.Dataset:
         {
             name: xr.Variable("slip", values, {"units": unit, "long_name": meaning})
             for name, (values, unit, meaning) in columns.items()
-            if name in MEANINGS
+            if name in ADDED
         }
     )
     for name in ("force_before", "force_after", "force_drop"):
@@ -227,15 +250,10 @@ def slips(output: OutputLike) -> xr.Dataset:
     return found
 
 
-def _over(unit: str, base: str) -> str:
-    """A unit over another, as CF writes them."""
-    return f"{base}-1" if unit == "1" else f"{unit} {base}-1"
-
-
 def _stick_columns(
     tree: Tree, data: xr.Dataset | Arrays, apparatus: Apparatus
-) -> Iterable[NDArray[np.float64]]:
-    """Columns of the stick phases, and the peak rate of fall, in the order of `COLUMNS`."""
+) -> dict[str, NDArray[np.float64]]:
+    """The columns `STICK_COLUMNS`, NaN where they are unknown."""
     root = tree.to_dataset()
     owners = data["realization_index"].values
     time = root["time"].values
@@ -247,39 +265,35 @@ def _stick_columns(
         is_good = ~np.isin(time, group_of(tree, "noise")["impulse_time"].values)
     for owner in np.unique(owners):
         mine = owners == owner
-        traces = {
-            one: root[one].values[owner].astype(float)
-            for one in (name, "drive_displacement")
-            if one in root
-        }
-        known = is_good & np.isfinite(traces[name])
-        drive = traces.get("drive_displacement")
-        if drive is not None and not np.isfinite(drive[known]).all():
-            drive = None
+        force = root[name].values[owner].astype(float)
+        known = is_good & np.isfinite(force)
+        drive = None
+        if "drive_displacement" in root:
+            drive = root["drive_displacement"].values[owner].astype(float)[known]
+            drive = drive if np.isfinite(drive).all() else None
         ends = ("start_time", "end_time", "force_before", "force_after")
         phases = stick_phases(
             time[known],
-            traces[name][known],
+            force[known],
             *(data[one].values[mine] for one in ends),
-            drive=None if drive is None else drive[known],
+            drive=drive,
             stiffness=apparatus.stiffness,
         )
-        for one in columns:
-            if one != "peak_fall_rate":
-                columns[one][mine] = getattr(phases, one)
+        for one in STICK_COLUMNS[:-1]:
+            columns[one][mine] = getattr(phases, one)
     if "peak_fall_rate" in data:
         columns["peak_fall_rate"] = data["peak_fall_rate"].values
     elif math.isfinite(apparatus.stiffness) and math.isfinite(apparatus.velocity):
         speed = np.abs(data["peak_velocity"].values)
         columns["peak_fall_rate"] = apparatus.stiffness * (speed - abs(apparatus.velocity))
-    return columns.values()
+    return columns
 
 
 def counts(tree: Tree) -> dict[str, Any] | None:
     """Numbers of slips of a measured trace by minimum fall; None for runs.
 
-    ``used`` is the minimum fall of the catalogue, ``plateau`` the range in which the number hardly
-    changes and at whose start it lies, or None.
+    ``used`` is the minimum fall of the catalogue. ``plateau`` is the range in which the number
+    hardly changes and at whose start it lies, or None.
     """
     if "slip_counts" not in tree.children:
         return None

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-# Samples of a batch in the marginal standard error rule.
+# Samples of a batch in the marginal standard error rule, and maximum length of a transient over
+# that of the series.
 BATCH = 5
-# Maximum length of a transient, over that of the series.
 MAX_TRANSIENT = 0.5
 # Discarded samples over the length of the transient by the rule, and their maximum share.
 MARGIN = 2
@@ -34,40 +34,27 @@ ROUNDING = 1e-9
 
 @dataclass(frozen=True)
 class SteadyMean:
-    """Mean of the steady part of a series.
-
-    Attributes
-    ----------
-    mean, error
-        Mean, and its standard error; NaN if there are too few samples.
-    half_width
-        Half the width of the 95 % interval, by Student's distribution for the number of blocks.
-    standard_deviation
-        Standard deviation of the values about the mean.
-    start
-        Number of samples discarded at the start: twice the transient.
-    count
-        Number of samples in the steady part, over all realizations.
-    block
-        Block length in samples, for the standard error.
-    effective_count
-        Number of independent samples with the same error.
-    is_steady
-        Whether the transient is over, and the halves of the rest agree.
-    is_resolved
-        Whether the series is long enough for a reliable error: some 20 independent samples.
-    """
+    """Mean of the steady part of a series."""
 
     mean: float
     error: float
+    """Standard error of the mean; NaN for too few samples."""
     half_width: float
+    """Half the width of the 95 % interval, by Student's distribution for the number of blocks."""
     standard_deviation: float
+    """That of the values about the mean."""
     start: int
+    """Number of samples discarded at the start: twice the transient."""
     count: int
+    """Number of samples in the steady part, over all realizations."""
     block: int
+    """Block length for the standard error [samples]."""
     effective_count: float
+    """Number of independent samples with the same error."""
     is_steady: bool
+    """Whether the transient is over, and the halves of the steady part agree."""
     is_resolved: bool
+    """Whether the series is long enough for a reliable error: some 20 independent samples."""
 
     @property
     def correlation(self) -> float:
@@ -76,11 +63,11 @@ class SteadyMean:
 
 
 def transient(series: Array) -> int:
-    """Length in samples of the initial transient of a series, by the marginal standard error rule.
+    """Length of the initial transient of a series [samples], by the marginal standard error rule.
 
-    MSER-5 (White, Simulation 69, 323 (1997)): of the means of five samples each, so many are
-    discarded that (variance of the rest)/(number of the rest) is minimal; at most half of the
-    series.
+    MSER-5 (White, Simulation 69, 323 (1997)): of the means of five samples each, the first are
+    discarded up to the minimum of the variance of the others over their number; at most half of
+    the series.
     """
     batch = BATCH if series.size >= 4 * BATCH * BATCH else 1
     count = series.size // batch
@@ -89,7 +76,7 @@ def transient(series: Array) -> int:
     # An incomplete batch is discarded at the start.
     remainder = series.size - count * batch
     means = series[remainder:].reshape(count, batch).mean(axis=1)
-    # Relative to the last value: squares of a large mean would hide the variance in rounding.
+    # Relative to the last value: the variance is not lost in the rounding of a large mean.
     means = means - means[-1]
     rest = np.arange(count, 0, -1)
     total = np.cumsum(means[::-1])[::-1]
@@ -101,24 +88,15 @@ def transient(series: Array) -> int:
 
 
 def steady_mean(values: Array) -> SteadyMean | None:
-    """Mean of the steady part of a series, with its error.
+    """Mean of the steady part of series of shape (realizations, samples); None for too few samples.
+
+    Realizations are independent, and have the same times; the transient is that of their mean.
 
     The error is that of block means. The block length is the smallest of 1, 2, 4, ... samples on
     the plateau of the error, B³ > 2 n (e_B/e_1)⁴, where the remaining correlation between blocks is
     smaller than the statistical error of e_B (Lee et al., Phys. Rev. E 83, 066706 (2011)). That
     correlation makes e_B too small; blocks of a third of the length correct it to first order in
     1/B: e² = 2 e_B² - e²_(B/3) (Vats and Flegal, Biometrika 109, 735 (2022)), if that is larger.
-
-    Parameters
-    ----------
-    values
-        Shape (realizations, samples) with the same times; realizations are independent. The
-        transient is that of their mean.
-
-    Returns
-    -------
-    SteadyMean or None
-        None if there are fewer than 20 samples.
     """
     from scipy.special import stdtrit
 
@@ -126,8 +104,8 @@ def steady_mean(values: Array) -> SteadyMean | None:
     if samples < MIN_SAMPLES:
         return None
     length = transient(values.mean(axis=0))
-    # The rest of the transient after the rule is as large as the error; after twice the length it
-    # is negligible.
+    # After the length by the rule, the transient is still as large as the error; after twice that
+    # length it is negligible.
     start = min(MARGIN * length, int(MAX_DISCARDED * samples))
     steady = values[:, start:]
     count = steady.size

@@ -1,7 +1,7 @@
-"""Stick phases between slips: their duration, how the force grows, and what creeps before a slip.
+"""Stick phases between slips: duration, growth of the force, and creep before a slip.
 
-While the slider sticks, the force grows by the stiffness times the displacement of the drive. What
-it grows less is creep: the displacement of the slider,
+While the slider sticks, the force grows by the stiffness times the displacement of the drive. If it
+grows less, the slider creeps: its displacement is
 
     X = X_d - F/K.
 """
@@ -16,37 +16,28 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-# Part of a stick phase in which the loading is measured: after ringing, before creep.
+# Part of a stick phase in which the loading is measured, after ringing and before creep, and
+# minimum number of samples in it.
 LOADING = (0.1, 0.5)
-# Minimum number of samples in it.
 MIN_SAMPLES = 4
-# Minimum displacement of the drive in a stick phase over its path: it does not turn.
-MIN_PATH = 0.9
+# Minimum displacement over path length of a drive that moves in one direction.
+MIN_DIRECTNESS = 0.9
 
 
 @dataclass(frozen=True)
 class StickPhases:
-    """The stick phase before each slip, arrays of shape (slips,); NaN if unknown.
-
-    Attributes
-    ----------
-    stick_duration
-        Time from the end of the slip before to the start of this one [s].
-    loading_rate
-        Rate of the force in the first half of the stick phase [N/s].
-    loading_stiffness
-        The same over the displacement of the drive [N/m].
-    creep_displacement
-        Displacement of the slider in the stick phase, along the drive [m].
-    creep_share
-        Its share of the displacement of the drive in the stick phase.
-    """
+    """The stick phase before each slip, arrays of shape (slips,); NaN if unknown."""
 
     stick_duration: Array
+    """Time from the end of the slip before to the start of this one [s]."""
     loading_rate: Array
+    """Rate of the force in the first half of the stick phase [N/s]."""
     loading_stiffness: Array
+    """The same over the displacement of the drive [N/m]."""
     creep_displacement: Array
+    """Displacement of the slider in the stick phase, along the drive [m]."""
     creep_share: Array
+    """Its share of the displacement of the drive in the stick phase."""
 
 
 def stick_phases(
@@ -60,20 +51,9 @@ def stick_phases(
     drive: Array | None = None,
     stiffness: float = math.nan,
 ) -> StickPhases:
-    """The stick phases before the slips of one trace.
+    """The stick phases before the slips of a trace without impulses.
 
-    Parameters
-    ----------
-    time, force
-        The trace without impulses, shape (samples,).
-    start_time, end_time
-        Start and end of each slip [s], shape (slips,).
-    force_before, force_after
-        Forces there, in the unit of the trace.
-    drive
-        Displacement of the drive [m], shape (samples,), if it is known.
-    stiffness
-        Stiffness of the spring, unit of the force over metre; NaN for the median of the measured.
+    A stiffness that is NaN stands for the median of the loading stiffness.
     """
     number = len(start_time)
     duration, rate, measured, driven = (np.full(number, np.nan) for _ in range(4))
@@ -108,4 +88,4 @@ def stick_phases(
 def _is_one_way(drive: Array) -> bool:
     """Whether the drive does not turn, but for noise."""
     path = float(np.abs(np.diff(drive[:: max(1, len(drive) // 50)])).sum())
-    return abs(float(drive[-1] - drive[0])) >= MIN_PATH * path
+    return abs(float(drive[-1] - drive[0])) >= MIN_DIRECTNESS * path

@@ -26,7 +26,6 @@ def slips(
     as_json: JsonOption = False,
 ) -> None:
     """Print the catalogue of slips, with statistics."""
-    from mesoslip.analysis import slip_tables
     from mesoslip.analysis import slips as catalogues
     from mesoslip.output import files, targets
     from mesoslip.output.table_files import is_printed, write_printed
@@ -35,7 +34,7 @@ def slips(
         targets.check_writable(table, [output])
     with files.opened_arrays(output) as tree:
         catalogue, counts = catalogues.catalogue_of(tree), catalogues.counts(tree)
-    for_print = slip_tables.printed(catalogue)
+    for_print = catalogue.printed()
     if table is not None and is_printed(table):
         write_printed([for_print], table)
     elif table is not None:
@@ -48,7 +47,7 @@ def slips(
     print_table((for_print.head, *for_print.rows))
     typer.echo(f"{counted(len(rows), 'slip')}{'; all columns with --csv FILE' if rows else ''}")
     if rows:
-        statistics = slip_tables.printed_statistics(catalogue)
+        statistics = catalogue.printed_statistics()
         typer.echo("")
         print_table((statistics.head, *statistics.rows))
     if counts is not None:

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mesoslip.analysis.even_traces import INTERVAL_TOLERANCE, first_velocity
+from mesoslip.analysis.apparatus import first_velocity
+from mesoslip.analysis.even_traces import INTERVAL_TOLERANCE
 from mesoslip.analysis.sampled_slips import estimated_period
 from mesoslip.configuration.config import Config
 from mesoslip.errors import ConfigError, FileError, Problem, RunError

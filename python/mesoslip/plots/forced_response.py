@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from mesoslip.analysis.experiment import Experiment
+from mesoslip.analysis.experiment_stages import Experiment
 from mesoslip.analysis.response import creep_line, friction_line, response_of
 from mesoslip.configuration.config import Config
 from mesoslip.errors import MesoslipError

@@ -12,7 +12,7 @@ from matplotlib.font_manager import FontProperties
 from matplotlib.transforms import offset_copy
 from numpy.typing import NDArray
 
-from mesoslip.analysis.experiment import Experiment
+from mesoslip.analysis.experiment_stages import Experiment
 from mesoslip.output.arrays import Tree
 from mesoslip.plots.style import BLUE, axes_width, titles, wrapped
 from mesoslip.quantities import Scale, scale_for, with_unit

@@ -5,12 +5,11 @@ exponential or a Gaussian cutoff. It is fitted here and not by the library ``pow
 distances of a discrete law with a cutoff are those of a continuous one, and which gives neither
 errors of such a law nor its goodness of fit.
 
-How the minimum size is chosen, and that the errors cover, was measured: see
+The choice of the minimum size and the coverage of the errors were measured: see
 ``tests/studies/exponent_coverage.py`` and its results in ``docs/exponents.md``.
 """
 
 from mesoslip.analysis.avalanche_sizes.comparison import LawComparison, compare_laws
-from mesoslip.analysis.avalanche_sizes.histogram import LogarithmicBins, ccdf, logarithmic_bins
 from mesoslip.analysis.avalanche_sizes.laws import EXPONENTIAL_CUTOFF, FORMS, Form
 from mesoslip.analysis.avalanche_sizes.power_law import (
     REJECTED,
@@ -20,6 +19,7 @@ from mesoslip.analysis.avalanche_sizes.power_law import (
     fit_power_law,
     local_exponents,
 )
+from mesoslip.analysis.avalanche_sizes.tally import LogarithmicBins, ccdf, logarithmic_bins
 
 __all__ = [
     "EXPONENTIAL_CUTOFF",

@@ -1,4 +1,4 @@
-"""How far sizes are from the law that was fitted to them, and whether that is too far."""
+"""Goodness of fit: distances of sizes from the law fitted to them, and their probability."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from mesoslip.analysis.avalanche_sizes.laws import Law, likeliest_law, uncut_law
 from mesoslip.analysis.avalanche_sizes.sums import sum_rule
 from mesoslip.analysis.avalanche_sizes.tally import Array, Tally
 
-# Bins of chi-squared: in a factor of ten, and sizes expected in each at least.
+# Bins of chi-squared in a factor of ten, and minimum expected number of sizes in each.
 BINS = 10
 MIN_EXPECTED = 10.0
-# Sizes that the goodness of fit is tested with at most.
-TEST_SIZES = 1_000_000
-# Relative steps of tables of cumulative probabilities: of misfits, where any size is added to
-# them, and of synthetic sizes, which are uniform between two of them.
+# Maximum number of sizes in a test.
+MAX_TESTED = 1_000_000
+# Relative steps of tables of cumulative probabilities: of misfits, which have all sizes too, and of
+# synthetic sizes, which are uniform within a step.
 MISFIT_STEP = 0.05
 TABLE_STEP = 0.002
 
@@ -27,21 +27,21 @@ class Misfit(NamedTuple):
     """Distances of sizes from a law."""
 
     distance: float
-    """Kolmogorov-Smirnov."""
+    """Kolmogorov-Smirnov distance."""
     chi_squared: float
-    """Of the sizes in logarithmic bins: it weighs tails more than the distance does."""
+    """χ² of the sizes in logarithmic bins, which weighs tails more than the distance does."""
     agreement: float
-    """Probability of a larger one; 1 if there are too few bins to test."""
+    """Probability of a larger χ²; 1 if there are too few bins to test."""
 
 
 def _offsets(last: float, ratio: float) -> Array:
-    """Integers from 0 to a last one in steps of 1 or of a share of the integer, if that is more."""
+    """Integers from 0 to a last one, in steps of 1 or of a ratio."""
     number = math.ceil(math.log(last + 1) / ratio) + 1
     return np.unique(np.rint(np.geomspace(1.0, last + 1, number))) - 1
 
 
 def misfit(law: Law, tally: Tally) -> Misfit:
-    """How far sizes are from the law that was fitted to them."""
+    """Distances of sizes from the law fitted to them."""
     points = np.union1d(
         tally.sizes, law.min_size + _offsets(tally.sizes[-1] - law.min_size, MISFIT_STEP)
     )
@@ -50,7 +50,7 @@ def misfit(law: Law, tally: Tally) -> Misfit:
     part = tally.counts / tally.total
     observed = np.cumsum(part)
     difference = below - observed
-    # Next, just before each size.
+    # The distance just before each size.
     before = difference - np.exp(law.log_probability(tally.sizes)) + part
     distance = float(max(np.max(np.abs(difference)), np.max(np.abs(before))))
 
@@ -60,7 +60,7 @@ def misfit(law: Law, tally: Tally) -> Misfit:
     bins = np.concatenate([[0.0], np.minimum(cumulative[last], 1.0), [1.0]]) * tally.total
     rows = np.searchsorted(tally.sizes, points[last], side="right")
     counts = np.concatenate([[0.0], np.concatenate([[0.0], observed])[rows], [1.0]]) * tally.total
-    # Bins are joined until enough is expected in each; the remainder at the end joins the last.
+    # Bins are joined until enough sizes are expected in each; the last takes up the remainder.
     ends_kept = [0]
     for end in range(1, len(bins)):
         enough = bins[end] - bins[ends_kept[-1]] >= MIN_EXPECTED
@@ -104,13 +104,13 @@ class Source:
 
 
 def p_value(tally: Tally, law: Law, replicas: int, generator: np.random.Generator) -> float:
-    """Share of synthetic samples, and the sizes, that fit as badly as the sizes do.
+    """Share of samples, the sizes and synthetic ones, that fit as badly as the sizes or worse.
 
-    How badly is the worse of the ranks of the distance and of chi-squared among all samples.
+    They are ranked by the worse of their ranks by distance and by χ².
     """
 
     def misfit_of(sample: Tally) -> Misfit:
-        # The tail of very steep laws may be too short for a fit, and any law fits it.
+        # The tail of very steep laws may be too short for a fit; then any law fits.
         if sample.is_degenerate:
             return Misfit(0.0, 0.0, 1.0)
         pure = uncut_law(sample, law.min_size, law.max_size)

@@ -1,4 +1,4 @@
-"""Power laws with a cutoff and a correction, and the likeliest one of a sample.
+"""Power laws with a cutoff and a correction, and the likeliest law of a sample.
 
 p(s) = s^-τ exp(-(s/s_c)^c) exp(a s^-b)/Z is an exponential family in τ, s_c^-c and a: the
 likelihood has one maximum, which Newton's method finds.
@@ -16,9 +16,9 @@ import scipy
 from mesoslip.analysis.avalanche_sizes.sums import MIN_RATE, Rule, sum_rule
 from mesoslip.analysis.avalanche_sizes.tally import Array, Tally
 
-# Sums of laws that rise more steeply before they fall would need more nodes.
+# Minimum exponent: sums of laws that rise more steeply would need more nodes.
 MIN_EXPONENT = -20.0
-# Newton's steps, of which some ten are needed.
+# Maximum number of Newton's steps, of which some ten are needed.
 MAX_STEPS = 200
 # Standard deviation of the prior of a correction's amplitude: of order one at size one.
 CORRECTION_WIDTH = 1.0
@@ -38,12 +38,11 @@ FORMS = tuple(Form(shape, power) for shape in (1.0, 2.0) for power in (0.0, 0.5,
 
 
 class _Moments(NamedTuple):
+    """ln Z, and mean and covariance of the features f."""
+
     log_norm: float
-    """Logarithm of the sum of exp(-θ·f) over the sizes."""
     mean: Array
-    """Of the features f, shape (parameter)."""
     covariance: Array
-    """Shape (parameter, parameter)."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +58,7 @@ class Law:
     """θ: τ; (scale/s_c)^c if there is a cutoff; a if there is a correction."""
     moments: _Moments
     fitted_form: Form
-    """The form that was fitted; with a cutoff also where the likeliest law has none."""
+    """The form that was fitted; it has a cutoff even if the likeliest law has none."""
 
     @property
     def exponent(self) -> float:
@@ -68,7 +67,7 @@ class Law:
 
     @property
     def cutoff(self) -> float:
-        """s_c; infinite if there is none."""
+        """s_c; infinite without a cutoff."""
         if not self.form.cutoff_shape:
             return math.inf
         ratio = float(self.parameters[1]) ** (-1 / self.form.cutoff_shape)
@@ -76,7 +75,7 @@ class Law:
 
     @property
     def correction(self) -> float:
-        """a; 0 if there is no correction."""
+        """a; 0 without a correction."""
         return float(self.parameters[-1]) if self.form.correction_power else 0.0
 
     def log_probability(self, sizes: Array) -> Array:
@@ -88,10 +87,10 @@ class Law:
         return logarithm - self.moments.log_norm
 
     def masses(self, sizes: Array) -> Array:
-        """The probability of all sizes above the one before, or from the minimum, up to each."""
+        """Probabilities of the intervals of sizes that end at these sizes."""
         before = np.concatenate([[self.min_size - 1.0], sizes[:-1]])
         length = sizes - before
-        # The rule of a block with two nodes.
+        # Sum over each interval by two nodes.
         half = np.sqrt((length**2 - 1) / 12)
         centre = (before + sizes + 1) / 2
         ends = np.exp(self.log_probability(np.stack([centre - half, centre + half])))
@@ -103,7 +102,7 @@ class Law:
         return np.sqrt(np.diag(np.linalg.inv(count * _information(self, count))))
 
     def cutoff_error(self, count: int) -> float:
-        """Standard error of s_c; infinite if there is none."""
+        """Standard error of s_c; infinite without a cutoff."""
         if not self.form.cutoff_shape:
             return math.inf
         relative = float(self.errors(count)[1] / self.parameters[1])
@@ -123,7 +122,7 @@ def _features(form: Form, min_size: int, scale: float, log_ratio: Array, offset:
 
 
 def _prior(form: Form, count: int) -> Array:
-    """Precision of the prior of each parameter, for one size of a number."""
+    """Precision of the prior of each parameter, over the number of sizes."""
     precision = np.zeros(1 + bool(form.cutoff_shape) + bool(form.correction_power))
     if form.correction_power:
         precision[-1] = 1 / (count * CORRECTION_WIDTH**2)
@@ -131,7 +130,7 @@ def _prior(form: Form, count: int) -> Array:
 
 
 def _information(law: Law, count: int) -> Array:
-    """Information of one size about the parameters, with the prior's."""
+    """Information of one size about the parameters, with that of the prior."""
     information: Array = law.moments.covariance + np.diag(_prior(law.form, count))
     return information
 
@@ -153,9 +152,9 @@ def _moments(rule: Rule, features: Array, parameters: Array) -> _Moments:
 
 
 def _uncut_moments(rule: Rule, features: Array, parameters: Array) -> _Moments:
-    """The same without a cutoff: if sizes go on, with the integral over those beyond the rule.
+    """Moments without a cutoff, with the integral beyond an open rule.
 
-    Features but the first are negligible there.
+    All features but the first are negligible there.
     """
     inside = _moments(rule, features, parameters)
     if not rule.is_open:
@@ -199,23 +198,10 @@ def uncut_law(tally: Tally, min_size: int, max_size: int | None) -> Law:
 
 
 def likeliest_law(form: Form, tally: Tally, pure: Law) -> Law | None:
-    """The likeliest law of a form; without the cutoff where none is likelier, or nearly.
+    """The likeliest law of a form; None if it has a correction that the sizes cannot determine.
 
-    So it is where sizes vary so little that s^-τ and the cutoff are no different.
-
-    Parameters
-    ----------
-    form
-        The form.
-    tally
-        Sizes between the limits of the pure law.
-    pure
-        The likeliest law without cutoff and correction.
-
-    Returns
-    -------
-    Law or None
-        None if the form has a correction that the sizes cannot determine.
+    The sizes are between the limits of the pure law. The law has no cutoff if that is likelier, or
+    if the sizes vary so little that s^-τ and the cutoff cannot be distinguished.
     """
     start = pure
     if form.correction_power:
@@ -242,7 +228,7 @@ def likeliest_law(form: Form, tally: Tally, pure: Law) -> Law | None:
         )
         if expected <= sample:
             return replace(start, fitted_form=form)
-    # The mean of (s/scale)^c of an exponential law is that of the sizes at this rate.
+    # With this rate, an exponential law has the mean of (s/scale)^c of the sizes.
     first = [start.exponent, 1 / (sample + (1 / scale) ** form.cutoff_shape)]
     cut = _newton(form, tally, pure, [*first, *start.parameters[1:]], scale)
     return replace(start, fitted_form=form) if cut is None else cut
@@ -251,9 +237,9 @@ def likeliest_law(form: Form, tally: Tally, pure: Law) -> Law | None:
 def _newton(
     form: Form, tally: Tally, pure: Law, start: list[float], scale: float = 1.0
 ) -> Law | None:
-    """The likeliest law by Newton's method, with steps cut as long as the cost does not fall.
+    """The likeliest law by Newton's method, with steps halved until the cost decreases.
 
-    Returns None where the likelihood has no maximum at a finite cutoff, or no definite one.
+    None if the likelihood has no maximum at a finite cutoff, or no definite maximum.
     """
     rule = sum_rule(pure.min_size, pure.max_size)
     moments_of = _moments if form.cutoff_shape else _uncut_moments
@@ -283,7 +269,7 @@ def _newton(
         step = -np.linalg.solve(curvature, slope)
         is_whole = True
         for one in np.flatnonzero(now + step <= floor):
-            # The best step that stays within the range of this parameter.
+            # The best step within the range of this parameter.
             is_whole = False
             rest = np.arange(len(now)) != one
             step[one] = 0.9 * (floor[one] - now[one])
@@ -313,6 +299,6 @@ def log_likelihood(law: Law, tally: Tally) -> float:
 
 
 def log_posterior(law: Law, tally: Tally) -> float:
-    """The same with the prior of a correction, up to a constant."""
+    """The logarithm of likelihood and prior, up to a constant."""
     prior = _prior(law.form, tally.total) * tally.total
     return log_likelihood(law, tally) - float(0.5 * prior @ law.parameters**2)

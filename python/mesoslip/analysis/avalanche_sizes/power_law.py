@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mesoslip.analysis.avalanche_sizes.goodness import TEST_SIZES, Misfit, misfit, p_value
+from mesoslip.analysis.avalanche_sizes.goodness import MAX_TESTED, Misfit, misfit, p_value
 from mesoslip.analysis.avalanche_sizes.laws import (
     FORMS,
     Form,
@@ -22,19 +22,18 @@ from mesoslip.analysis.avalanche_sizes.laws import (
 from mesoslip.analysis.avalanche_sizes.tally import MIN_DIFFERENT, Array, Tally, tally_of
 from mesoslip.errors import MesoslipError
 
-# A cutoff is resolved if a law without one is less likely than this to look as much cut.
+# Significance below which a cutoff is resolved, and p-value below which a fit is rejected.
 RESOLVED = 0.01
-# A fit is rejected if sizes of its law are less likely than this to fit as badly.
 REJECTED = 0.05
 
-# A law may begin where sizes in bins agree with its best form at this level: a stricter test goes
-# on for the noise of the largest sizes.
+# Minimum agreement of sizes in bins with the best form, from which on a law may begin: a stricter
+# test would exclude sizes for the noise of the largest ones.
 AGREEMENT = 0.01
-# It is fitted from this multiple of that size on: a deviation too small to be seen there biases the
-# exponent by less than its error here.
+# Multiple of that size from which the law is fitted: a deviation too small to be detected there
+# biases the exponent by less than its error here.
 BEYOND = 6
-# A chosen minimum size leaves at least this number of sizes, and this ratio of sizes.
-MIN_LEFT = 50
+# Minimum number of sizes above a chosen minimum size, and minimum ratio of the largest to it.
+MIN_ABOVE = 50
 MIN_RANGE = 10
 
 
@@ -42,14 +41,14 @@ class FittedForm(NamedTuple):
     """The likeliest law of one form."""
 
     form: Form
-    """With a cutoff shape of 0 where the likeliest law has no cutoff."""
+    """Its cutoff shape is 0 if the likeliest law has no cutoff."""
     exponent: float
     exponent_error: float
     """Standard error if the law has this form."""
     cutoff: float
-    """s_c; infinite if there is none."""
+    """s_c; infinite without a cutoff."""
     correction: float
-    """Amplitude a of the correction; 0 if there is none."""
+    """Amplitude a of the correction; 0 without one."""
     weight: float
     """Akaike weight among the forms."""
 
@@ -72,17 +71,17 @@ class PowerLawFit:
     exponent_error: float
     """Its standard error, with the uncertainty of the form."""
     form: Form
-    """The best form, which the numbers below belong to."""
+    """The best form. The following values belong to it."""
     cutoff: float
-    """s_c; infinite if the likeliest law has none. See `cutoff_is_resolved`."""
+    """s_c; infinite if the likeliest law has none."""
     cutoff_error: float
     """Its standard error; infinite if the cutoff is."""
     min_size: int
     """Minimum size of the law."""
     max_size: int | None
-    """Maximum size of the law; None if there is none."""
+    """Maximum size of the law, if any."""
     count: int
-    """Sizes between the limits."""
+    """Number of sizes between the limits."""
     log_likelihood: float
     """Natural logarithm of their probability."""
     distance: float
@@ -90,7 +89,7 @@ class PowerLawFit:
     p_value: float
     """Probability that sizes of such a law fit as badly; NaN if not tested."""
     tested: int
-    """Sizes that this was tested with; 0 if not tested."""
+    """Number of tested sizes."""
     cutoff_significance: float
     """Probability that a law without cutoff looks as much cut as the sizes."""
     pure_exponent: float
@@ -98,7 +97,7 @@ class PowerLawFit:
     pure_exponent_error: float
     """Its standard error if that is the law."""
     forms: tuple[FittedForm, ...]
-    """All forms that were averaged, the best first."""
+    """All averaged forms, the best first."""
 
     @property
     def cutoff_is_resolved(self) -> bool:
@@ -107,7 +106,7 @@ class PowerLawFit:
 
     @property
     def is_rejected(self) -> bool:
-        """Whether the sizes are not of such a law; its numbers mean nothing then."""
+        """Whether the sizes do not follow such a law; then its exponent and cutoff are void."""
         return self.p_value < REJECTED
 
 
@@ -125,11 +124,10 @@ class LocalExponent:
 
 
 class _Candidate(NamedTuple):
-    """Laws of all forms, fitted to the same sizes."""
+    """Laws of all forms fitted to the same sizes, the best first, and their Akaike weights."""
 
     pure: Law
     laws: tuple[Law, ...]
-    """The best first."""
     weights: tuple[float, ...]
 
     @property
@@ -142,8 +140,8 @@ def _candidate(
 ) -> _Candidate:
     """The likeliest law of each form, and their Akaike weights.
 
-    A cutoff that is not resolved stays: the exponent of a pure law is too large, and its error far
-    too small, where there is a cutoff that the sizes do not show.
+    A cutoff that is not resolved is kept: without it, the exponent would be too large and its error
+    far too small if there is a cutoff that the sizes do not show.
     """
     pure = uncut_law(tally, min_size, max_size)
     fitted: dict[Form, Law] = {}
@@ -165,7 +163,7 @@ def _chosen(tally: Tally, max_size: int | None, forms: tuple[Form, ...]) -> int:
     """The minimum size: well beyond the first one from which the best form agrees."""
     not_smaller = np.cumsum(tally.counts[::-1])[::-1]
     different = np.arange(len(tally.sizes), 0, -1)
-    enough = (not_smaller >= MIN_LEFT) & (different >= MIN_DIFFERENT)
+    enough = (not_smaller >= MIN_ABOVE) & (different >= MIN_DIFFERENT)
     enough &= tally.sizes * MIN_RANGE <= tally.sizes[-1]
     last = tally.sizes[enough][-1] if np.any(enough) else tally.sizes[0]
     grid = np.rint(10 ** (np.arange(math.floor(10 * math.log10(last)) + 1) / 10))
@@ -195,42 +193,42 @@ def fit_power_law(
     """The power law of sizes: p(s) = s^-τ exp(-(s/s_c)^c) exp(a s^-b)/Z.
 
     The form of the cutoff, and of a correction to the law of small sizes, is not known, and the
-    exponent depends on it: so it is averaged over the forms, exponential and Gaussian cutoffs with
-    no correction or one that dies as s^(-1/2) or 1/s, by Akaike's weights. Its variance is the mean
-    of those of the forms plus the variance among them [2]_. The amplitude a has a normal prior of
-    width CORRECTION_WIDTH.
+    exponent depends on it. So the exponent is averaged by Akaike's weights over the forms:
+    exponential and Gaussian cutoffs, without a correction or with one that decays as s^(-1/2) or
+    1/s. Its variance is the mean of those of the forms plus the variance among them [2]_. The
+    amplitude a has a normal prior of width CORRECTION_WIDTH.
 
-    The exponent of a geometric law is 0, and less than that of sizes that mostly grow more likely;
-    it is sought above MIN_EXPONENT. Errors are those of the observed information, and hold for
+    The exponent of a geometric law is 0, and negative for sizes whose probability mostly increases;
+    its minimum is MIN_EXPONENT. Errors are those of the observed information, and hold for
     independent sizes.
 
     A cutoff is always part of a form. It is resolved if its significance is below RESOLVED: twice
     the logarithm of the ratio of likelihoods with and without is zero for half of the samples of an
-    uncut law, since 1/s_c cannot be negative, and of one degree of freedom of χ² for the others.
-    Uncut laws with τ < 3 and no maximum size have no variance, and pass for cut ones more often:
-    twice as often for τ = 1.5.
+    uncut law, since 1/s_c cannot be negative, and χ² with one degree of freedom for the others.
+    Uncut laws with τ < 3 and no maximum size have no variance, and are taken for cut ones more
+    often: twice as often for τ = 1.5.
 
-    The goodness of fit of the best form goes by synthetic samples, each with a fit of its own [1]_,
-    and by two misfits together: the Kolmogorov-Smirnov distance, and χ² of the sizes in logarithmic
-    bins, which weighs tails more. Of more than TEST_SIZES sizes, only so many, chosen at random,
-    are tested.
+    The goodness of fit of the best form is tested by synthetic samples, each with a fit of its own
+    [1]_, and by two misfits together: the Kolmogorov-Smirnov distance, and χ² of the sizes in
+    logarithmic bins, which weighs tails more. At most MAX_TESTED sizes, chosen at random, are
+    tested.
 
     Parameters
     ----------
     sizes
         Positive integers, of any shape.
     min_size
-        Sizes below it are left out. None chooses: of ten in a decade, the first from which the
-        sizes in bins agree with the best form, times BEYOND, as far as MIN_LEFT sizes and a ratio
-        of MIN_RANGE remain above. If none agrees, the one of the minimum distance.
+        Sizes below it are left out. By default: of ten in a decade, the first from which the sizes
+        in bins agree with the best form, times BEYOND, as far as MIN_ABOVE sizes and a ratio of
+        MIN_RANGE remain above. If no form agrees, the one of the minimum distance.
     max_size
-        Sizes above are left out, and the law ends here.
+        Sizes above it are left out, and the law ends there.
     forms
-        Forms of the law; one of them, and its exponent is not averaged.
+        Forms of the law that are averaged.
     replicas
-        Synthetic samples of the test; none if 0.
+        Number of synthetic samples of the test.
     seed
-        Of the generator of the test.
+        Seed of the test.
 
     Returns
     -------
@@ -289,11 +287,11 @@ def fit_power_law(
 
 
 def _tested(tally: Tally, law: Law, replicas: int, seed: int) -> tuple[float, int]:
-    """Probability that sizes of a law fit as badly, and the number of sizes it was tested with."""
+    """Probability that sizes of a law fit as badly, and the number of tested sizes."""
     generator = np.random.default_rng(seed)
     sample = tally
-    if tally.total > TEST_SIZES:
-        counts = generator.multivariate_hypergeometric(tally.counts, TEST_SIZES, method="marginals")
+    if tally.total > MAX_TESTED:
+        counts = generator.multivariate_hypergeometric(tally.counts, MAX_TESTED, method="marginals")
         sample = Tally(tally.sizes[counts > 0], counts[counts > 0])
     return p_value(sample, law, replicas, generator), sample.total
 
@@ -304,36 +302,18 @@ def _cutoff_significance(law: Law, pure: Law, tally: Tally) -> float:
         return 1.0
     uncut = likeliest_law(law.form._replace(cutoff_shape=0.0), tally, pure) or pure
     ratio = 2 * (log_posterior(law, tally) - log_posterior(uncut, tally))
-    # A cutoff can only be on one side of none: half of the samples of an uncut law show one.
+    # 1/s_c cannot be negative: half of the samples of an uncut law show no cutoff.
     return math.erfc(math.sqrt(max(ratio, 0.0) / 2)) / 2
 
 
 def local_exponents(
     sizes: ArrayLike, min_size: int = 1, ratio: float = 10.0
 ) -> tuple[LocalExponent, ...]:
-    """Exponents of the pure power laws nearest to the sizes in windows that follow each other.
+    """Exponents of the pure power laws nearest to the sizes in successive windows.
 
-    A law with corrections or a cutoff has another exponent in each window; what holds for large
-    sizes is not known if they still change in the last ones.
-
-    Parameters
-    ----------
-    sizes
-        Positive integers, of any shape.
-    min_size
-        Where the first window starts.
-    ratio
-        Of the limits of a window.
-
-    Returns
-    -------
-    tuple of LocalExponent
-        For each window with enough sizes for a fit.
-
-    Raises
-    ------
-    MesoslipError
-        If a size is not a positive integer, or ``ratio`` is not above 1.
+    The limits of a window have the given ratio; windows with too few sizes are left out. A law with
+    corrections or a cutoff has another exponent in each window. If the last ones still differ, the
+    exponent of large sizes is not known.
     """
     if not ratio > 1:
         raise MesoslipError("ratio of the limits of a window is not above 1")

@@ -10,10 +10,10 @@ import scipy  # its parts are loaded when they are used
 
 from mesoslip.analysis.avalanche_sizes.tally import Array
 
-# Integers that are summed one by one, and nodes of longer blocks.
+# Maximum length of blocks that are summed integer by integer, and nodes of longer blocks.
 DIRECT = 16
 NODES = 12
-# Doublings of blocks, up to 2^53; a cutoff is negligible there for 1/s_c above MIN_RATE.
+# Doublings of blocks, up to 2^53. Above MIN_RATE for 1/s_c, sizes beyond are negligible.
 DOUBLINGS = 49
 MIN_RATE = 2.0**-47
 
@@ -46,14 +46,14 @@ class Rule:
     last: float
     """The last offset of the sum."""
     is_open: bool
-    """Whether sizes go on beyond it."""
+    """Whether the law continues beyond it."""
 
 
 @lru_cache
 def sum_rule(min_size: int, max_size: int | None) -> Rule:
-    """The rule of all sizes between the limits; without an upper one if that is None.
+    """The rule of all sizes between the limits; no upper limit if that is None.
 
-    Blocks start at offsets that double: so s^-τ varies as little in all of them, and a cutoff
+    Blocks start at offsets that double: so s^-τ varies by the same factor in each, and a cutoff
     varies much only where it is small.
     """
     total = DIRECT << DOUBLINGS

@@ -1,4 +1,4 @@
-"""The noise of a measured trace: what it consists of, what can be taken off, and its errors."""
+"""The noise of a measured trace: its parts, their removal, and the errors by noise."""
 
 from mesoslip.analysis.noise.estimate import TraceNoise, estimate_noise, without_impulses
 from mesoslip.analysis.noise.hum import HumLine

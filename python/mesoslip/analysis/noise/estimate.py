@@ -32,51 +32,34 @@ MANY_IMPULSES = 0.05
 
 @dataclass(frozen=True)
 class TraceNoise:
-    """The noise of a trace.
+    """The noise of a trace: white and correlated noise, impulses, hum and drift.
 
-    White noise and correlated noise add up; deviations are standard deviations in the unit of the
-    force, without impulses and hum.
-
-    Attributes
-    ----------
-    deviation
-        Of the white noise, with that of digital steps; that of the part with most samples.
-    correlated_deviation
-        Of the noise that is correlated from sample to sample; 0 for none.
-    correlation_time
-        Time in which the autocorrelation of the latter decays [s].
-    digital_step
-        Step of a digitized trace; 0 for none.
-    impulse_time
-        Times of the samples in impulses [s], shape (impulses,).
-    impulse_share
-        Their share of the samples.
-    impulse_size
-        Median size of impulses; 0 for none.
-    hum
-        Narrow lines of the spectrum that are not the trace's own.
-    drift
-        Slow drift, in the unit of the force over s; 0 if it is not significant.
-    duration
-        Duration of the trace [s].
-    intervals
-        Sampling interval of each part of the trace [s].
-    deviations
-        Standard deviation of the white noise in each part.
+    Sizes are in the unit of the force, and 0 where there is nothing; deviations are standard
+    deviations without impulses and hum.
     """
 
     deviation: float
+    """Deviation of the white noise, with that of digital steps, in the part with most samples."""
     correlated_deviation: float
+    """Deviation of the noise that is correlated from sample to sample."""
     correlation_time: float
+    """Time in which the autocorrelation of that noise decays [s]."""
     digital_step: float
     impulse_time: Array
+    """Times of the samples in impulses [s], shape (impulses,)."""
     impulse_share: float
+    """Share of these samples."""
     impulse_size: float
+    """Median size of impulses."""
     hum: tuple[HumLine, ...]
     drift: float
+    """Significant slow drift, in the unit of the force over s."""
     duration: float
+    """Duration of the trace [s]."""
     intervals: tuple[float, ...]
+    """Sampling interval of each part of the trace [s]."""
     deviations: tuple[float, ...]
+    """Deviation of the white noise in each part."""
 
     @property
     def total_deviation(self) -> float:
@@ -84,23 +67,11 @@ class TraceNoise:
         return math.hypot(self.deviation, self.correlated_deviation)
 
     def is_impulse(self, time: Array) -> NDArray[np.bool_]:
-        """Which samples are in impulses, shape (samples,).
-
-        Parameters
-        ----------
-        time
-            Times of the trace, or of a part of it [s].
-        """
+        """Which samples are in impulses; of the trace or a part of it."""
         return np.isin(time, self.impulse_time)
 
     def clean(self, time: Array, force: Array) -> Array:
-        """The force without hum, and with lines through the neighbours instead of impulses.
-
-        Parameters
-        ----------
-        time, force
-            The trace, or a part of it, shape (samples,).
-        """
+        """The force of the trace, or of a part of it, without hum and impulses."""
         cleaned = force.astype(float)
         for line in self.hum:
             cleaned -= line(time)
@@ -109,16 +80,11 @@ class TraceNoise:
     def linear_error(self, time: Array, weights: Array) -> float:
         """Standard error of a weighted sum of samples, sum_i w_i F_i, by the noise of the trace.
 
-        Parameters
-        ----------
-        time
-            Times of the samples [s], shape (samples,).
-        weights
-            w, shape (samples,), smooth over the correlation time.
+        The weights w are smooth over the correlation time.
         """
         variance = self.deviation**2 * float(weights @ weights)
         if self.correlated_deviation > 0 and self.correlation_time > 0:
-            # Sums of neighbours, so that there are some hundred points.
+            # Neighbours are summed, so that there are some hundred points.
             edges = np.unique(np.linspace(0, len(time), MAX_POINTS + 1).astype(int))[:-1]
             sums = np.add.reduceat(weights, edges)
             at = np.add.reduceat(time, edges) / np.diff([*edges, len(time)])
@@ -127,17 +93,11 @@ class TraceNoise:
         return math.sqrt(variance)
 
     def mean_error(self, time: Array) -> float:
-        """Standard error of the mean over samples at times [s], shape (samples,)."""
+        """Standard error of the mean over samples at times [s]."""
         return self.linear_error(time, np.full(len(time), 1 / max(len(time), 1)))
 
     def slope_error(self, time: Array) -> float:
-        """Standard error of the slope of a line fitted to samples, in the unit of the force over s.
-
-        Parameters
-        ----------
-        time
-            At least two times [s], shape (samples,).
-        """
+        """Standard error of the slope of a line through samples, unit of the force over s."""
         since = time - time.mean()
         return self.linear_error(time, since / (since @ since))
 
@@ -154,13 +114,7 @@ class TraceNoise:
         }
 
     def sentences(self, unit: str = "N") -> list[str]:
-        """Description of the noise, a sentence each.
-
-        Parameters
-        ----------
-        unit
-            Unit of the force, "N" or "1".
-        """
+        """Description of the noise; the unit of the force is "N" or "1"."""
 
         def size(value: float) -> str:
             return with_unit(value, unit)
@@ -196,16 +150,11 @@ class TraceNoise:
 
 
 def without_impulses(time: Array, values: Array, impulse_time: Array) -> Array:
-    """A trace with lines through the neighbours instead of the samples of impulses.
+    """A trace with lines through the neighbours instead of the samples of impulses."""
+    return _repaired(time, values, np.isin(time, impulse_time))
 
-    Parameters
-    ----------
-    time, values
-        The trace, shape (samples,).
-    impulse_time
-        Times of the samples in impulses [s].
-    """
-    wrong = np.isin(time, impulse_time)
+
+def _repaired(time: Array, values: Array, wrong: NDArray[np.bool_]) -> Array:
     if not wrong.any() or wrong.all():
         return values
     repaired = values.copy()
@@ -214,22 +163,11 @@ def without_impulses(time: Array, values: Array, impulse_time: Array) -> Array:
 
 
 def estimate_noise(time: Array, force: Array, *, hum: float | None = None) -> TraceNoise:
-    """Estimate the noise of a measured trace.
+    """Estimate the noise of a measured trace by medians, on which slips have no influence.
 
-    Parameters
-    ----------
-    time
-        Increasing times [s], shape (samples,); the sampling rate may change.
-    force
-        Force, or friction coefficient, shape (samples,), finite.
-    hum
-        Frequency of the mains [Hz], if known: then it and its harmonics are the hum. By default
-        any narrow line of the spectrum that is not the trace's own.
-
-    Returns
-    -------
-    TraceNoise
-        Each kind of noise; medians, on which slips have no influence.
+    Times [s] increase, at a rate that may change, and the force is finite. The hum is that of the
+    mains at a given frequency [Hz], with its harmonics; by default any narrow line of the spectrum
+    that is not the trace's own.
     """
     force = np.asarray(force, dtype=float)
     parts = parts_of(time)
@@ -243,9 +181,7 @@ def estimate_noise(time: Array, force: Array, *, hum: float | None = None) -> Tr
         if found.any():
             good = np.interp(np.flatnonzero(found), np.flatnonzero(~found), values[~found])
             sizes.append(np.abs(values[found] - good))
-    repaired = force.copy()
-    if wrong.any():
-        repaired[wrong] = np.interp(time[wrong], time[~wrong], force[~wrong])
+    repaired = _repaired(time, force, wrong).copy()
     lines = find_hum(
         time[main.samples],
         repaired[main.samples],

@@ -12,8 +12,7 @@ from mesoslip.analysis.power_spectrum import power_spectrum
 
 Array = NDArray[np.float64]
 
-# Frequencies of the mains [Hz], and the relative tolerance of a line's.
-MAINS = (50.0, 60.0)
+# Relative tolerance of the frequency of a line.
 TOLERANCE = 2e-3
 # Maximum harmonic of a given frequency.
 MAX_HARMONIC = 9
@@ -33,8 +32,8 @@ BLOCK_PERIODS, MEDIAN_BLOCKS = 4, 31
 MIN_SIGNIFICANCE, MIN_AMPLITUDE = 5.0, 0.3
 # Maximum power over the variance of the trace: above it the oscillation is the trace's own.
 MAX_SHARE = 0.2
-# Maximum standard deviation of the rest of a block over the white noise.
-MAX_REST = 2.5
+# Maximum standard deviation of the residuals of a block over the white noise.
+MAX_RESIDUAL = 2.5
 # Minimum ratio of the 20 % and the 80 % quantile of the amplitude.
 MIN_CONSTANCY = 0.5
 # Maximum number of lines.
@@ -43,25 +42,13 @@ MAX_LINES = 12
 
 @dataclass(frozen=True)
 class HumLine:
-    """A line of the hum, A cos(2 pi f t) + B sin(2 pi f t) with slowly varying A and B.
+    """A line of the hum, A cos(2 pi f t) + B sin(2 pi f t) with slowly varying A and B."""
 
-    Attributes
-    ----------
-    frequency
-        f [Hz].
-    amplitude
-        Median of (A^2 + B^2)^1/2, in the unit of the force.
-    time
-        Times [s] at which A and B are known, shape (blocks,).
-    cosine, sine
-        A and B, shape (blocks,).
-    """
-
-    frequency: float
-    amplitude: float
-    time: Array
-    cosine: Array
-    sine: Array
+    frequency: float  # f [Hz]
+    amplitude: float  # median of (A^2 + B^2)^1/2
+    time: Array  # at which A and B are known [s]
+    cosine: Array  # A
+    sine: Array  # B
 
     def __call__(self, time: Array) -> Array:
         """The hum at times [s], shape (samples,)."""
@@ -74,22 +61,13 @@ class HumLine:
 def find_hum(
     time: Array, force: Array, noise: float, *, frequency: float | None = None
 ) -> tuple[HumLine, ...]:
-    """Lines of hum in a trace.
+    """Lines of hum in a trace at equal intervals, with a standard deviation of the white noise.
 
     Lines stand out of the spectrum of the differences, clipped so that slips hardly count. Their
     amplitudes are medians over blocks of some periods: slips, in a minority of blocks, and ringing
     after slips, which has another phase each time, do not contribute. A line with a fifth of the
-    variance of the trace is its own oscillation, and so are its harmonics, unless the frequency is
-    given.
-
-    Parameters
-    ----------
-    time, force
-        Times [s] and samples at equal intervals, shape (samples,).
-    noise
-        Standard deviation of the white noise.
-    frequency
-        Frequency of the mains [Hz]; then it and its harmonics are the only candidates.
+    variance of the trace is its own oscillation, and so are its harmonics. If a frequency [Hz] is
+    given, it and its harmonics are the only candidates.
     """
     if len(force) < MIN_SAMPLES:
         return ()
@@ -137,7 +115,7 @@ def _candidates(force: Array, interval: float, given: float | None) -> list[floa
         at
         for at in np.flatnonzero(strong).tolist()
         if power[at] == power[max(0, at - 2 * LINE_BINS) : at + 2 * LINE_BINS + 1].max()
-        # Narrow: it has ended within some bins.
+        # A line is narrow: it ends within some bins.
         and power[max(0, at - 2 * LINE_BINS)] < 0.05 * power[at]
         and power[min(len(power) - 1, at + 2 * LINE_BINS)] < 0.05 * power[at]
     ]
@@ -162,14 +140,14 @@ def _line(
     noise: float,
     is_given: bool,
 ) -> HumLine | None:
-    """The line of a frequency, or None if it does not stand out."""
+    """The line of a frequency; None if it does not stand out."""
     from scipy.ndimage import median_filter
 
     length = max(16, round(BLOCK_PERIODS / frequency / interval))
     number = len(force) // length
     if number < 8:
         return None
-    # A whole number of periods, and lines taken off: neither mean nor slope leak into it.
+    # A mean and a slope are fitted too, so that they do not leak into the line.
     shape = (number, length)
     blocks, times = (one[: number * length].reshape(shape) for one in (force, time))
     at = np.arange(length) - (length - 1) / 2
@@ -177,7 +155,7 @@ def _line(
     first = 2 * math.pi * frequency * times.mean(axis=1)
     basis = np.stack([np.ones(length), at, np.cos(phase[0]), np.sin(phase[0])], axis=1)
     solution = np.linalg.pinv(basis) @ blocks.T
-    rest = float(np.median(np.sqrt(np.mean((blocks.T - basis @ solution) ** 2, axis=0))))
+    residual = float(np.median(np.sqrt(np.mean((blocks.T - basis @ solution) ** 2, axis=0))))
     # From the middle of each block to time 0.
     turned = (solution[2] - 1j * solution[3]) * np.exp(-1j * first)
     # Slow changes of the frequency turn the phase from block to block.
@@ -193,8 +171,8 @@ def _line(
     amplitude = float(np.median(np.abs(smooth)))
     if amplitude < max(MIN_SIGNIFICANCE * error, MIN_AMPLITUDE * noise):
         return None
-    # Blocks with slips have more than noise besides: the line is one of the slips' own.
-    if not is_given and rest > max(MAX_REST * noise, amplitude):
+    # Residuals larger than noise are those of slips: the line is one of their own.
+    if not is_given and residual > max(MAX_RESIDUAL * noise, amplitude):
         return None
     # Ringing decays between slips.
     low, high = np.quantile(np.abs(smooth), (0.2, 0.8))
@@ -203,7 +181,7 @@ def _line(
     middle = times.mean(axis=1)
     block_time = float(np.median(np.diff(middle)))
     corrected = frequency + turn / (2 * math.pi * block_time)
-    # The frequency takes up the mean turn; what remains is slow.
+    # The frequency takes up the mean turn; the amplitude then varies slowly.
     amplitude_now = smooth * np.exp(1j * turn * np.arange(number))
     slow = amplitude_now * np.exp(-2j * math.pi * (corrected - frequency) * middle)
     return HumLine(corrected, amplitude, middle, slow.real, -slow.imag)

@@ -1,4 +1,4 @@
-"""Impulses: one to three samples far off, between neighbours that agree."""
+"""Impulses: one to three outlying samples between neighbours that agree."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from mesoslip.analysis.noise.levels import NORMAL_MEDIAN
 
 Array = NDArray[np.float64]
 
-# Width of the median that an impulse leaves, and of that of the deviations around it.
+# Widths of the running medians of the force, and of the deviations from it [samples].
 WIDTH, SCATTER_WIDTH = 7, 15
-# Minimum size in standard deviations of the noise, and of the scatter around.
+# Minimum size in standard deviations of the noise, and of the scatter around it.
 MIN_SIZE, MIN_LOCAL_SIZE = 6.0, 5.0
 # Minimum size over the range of the trace between its 1 % and 99 % quantiles.
 MIN_RANGE = 2e-3
@@ -19,23 +19,16 @@ MIN_RANGE = 2e-3
 MAX_LENGTH, NEIGHBOURS = 3, 4
 # Maximum difference of both sides, over the size.
 MAX_STEP = 0.4
-# Minimum distance from the lines through the samples beside it, over the size: tops of oscillations
-# are no impulses.
+# Minimum distance from the lines through the samples beside it, over the size: maxima of
+# oscillations are smaller.
 MIN_JUMP = 0.5
 
 
 def find_impulses(force: Array, noise: float) -> NDArray[np.bool_]:
-    """Samples of impulses, shape (samples,).
+    """Whether each sample is in an impulse; the noise is a standard deviation.
 
-    Samples around are compared by medians, so a slip, whose sides differ, is none, nor is ringing,
-    of which neighbouring samples scatter as much.
-
-    Parameters
-    ----------
-    force
-        Samples at equal intervals, shape (samples,).
-    noise
-        Standard deviation of the white noise.
+    Slips are excluded because their sides differ, ringing because its neighbouring samples scatter
+    as much.
     """
     from scipy.ndimage import median_filter
 
@@ -69,9 +62,9 @@ def find_impulses(force: Array, noise: float) -> NDArray[np.bool_]:
 
 
 def _height_above(force: Array, starts: NDArray[np.int_], ends: NDArray[np.int_]) -> Array:
-    """How far the middle of each group of samples is off the lines through the samples beside it.
+    """Distance of the middle of each group of samples from the lines through its neighbours.
 
-    Negative if it is on the other side of one of them.
+    Negative if the middle is between the lines.
     """
     middle = (starts + ends - 1) // 2
     last = len(force) - 1

@@ -20,33 +20,28 @@ MAX_DISTINCT = 0.25
 MIN_WINDOW, MAX_WINDOW, MAX_WINDOWS = 8, 4096, 2000
 # Minimum number of windows of one length.
 MIN_WINDOWS = 12
-# Degree of the polynomials that are taken off in windows.
+# Degree of the polynomials that are removed in windows.
 DEGREE = 3
 # Maximum growth of the variance when windows become twice as long. That of noise grows by 2 at
 # most, up to a limit at the correlation time; that of a smooth signal grows by 256.
 MAX_GROWTH = 2.6
-# Windows with more than this multiple of the median variance have slips.
+# Maximum variance of windows without slips, over the median variance.
 MAX_VARIANCE = 2.5
 # Minimum correlated noise over the white noise.
 MIN_CORRELATED = 0.35
-# Maximum length of windows from which the correlation is fitted; minimum and number of the times
-# that are tried [samples].
+# Maximum length of windows from which the correlation is fitted; minimum and number of the fitted
+# correlation times [samples].
 MAX_FITTED, MIN_TIME, TIMES = 256, 0.5, 25
 
 
 def noise_level(force: Array) -> float:
-    """Standard deviation of white noise on a trace, in the unit of the force.
+    """Standard deviation of the white noise of a trace at equal intervals.
 
     The estimate is the median absolute difference of the trace, on which the few slips have no
     influence, at the order 1 to 7 for which it is smallest: a smooth, well sampled signal
     contributes less at higher orders. A digitized trace has at least the noise of its resolution.
     Noise that is correlated from sample to sample, as behind a filter, is underestimated:
     `correlated_noise` finds it.
-
-    Parameters
-    ----------
-    force
-        Samples at equal intervals, shape (samples,).
     """
     found = []
     for order in ORDERS:
@@ -60,9 +55,9 @@ def noise_level(force: Array) -> float:
 
 
 def digital_step_of(force: Array) -> float:
-    """Step of a digitized trace, in the unit of the force; 0 if it has too many distinct values.
+    """Step of a digitized trace: the smallest difference of distinct values beyond rounding.
 
-    It is the smallest difference of distinct values that is more than a rounding error.
+    0 if there are too many distinct values.
     """
     values = np.unique(force)
     if not 1 < values.size < MAX_DISTINCT * len(force):
@@ -75,11 +70,7 @@ def digital_step_of(force: Array) -> float:
 
 
 class CorrelatedNoise(NamedTuple):
-    """Noise around the smooth parts of a trace.
-
-    ``total`` and ``correlated`` are standard deviations, of all of it and of what is correlated;
-    the autocorrelation of the latter decays with the correlation ``time`` [samples].
-    """
+    """Standard deviations of all noise and its correlated part; correlation time [samples]."""
 
     total: float
     correlated: float
@@ -87,19 +78,12 @@ class CorrelatedNoise(NamedTuple):
 
 
 def correlated_noise(force: Array, white: float) -> CorrelatedNoise:
-    """Noise that is correlated from sample to sample.
+    """Noise that is correlated from sample to sample; ``white`` is that of the white noise.
 
-    The trace is cut into windows, and a polynomial is taken off in each. The median variance over
-    windows, on which slips have no influence while most windows have none, grows with their length,
-    up to the variance of the noise, and then with the signal: the longest windows before count. The
-    autocorrelation is that in windows without slips.
-
-    Parameters
-    ----------
-    force
-        Samples at equal intervals, shape (samples,).
-    white
-        Standard deviation of the white noise.
+    The trace is cut into windows, and a polynomial is removed in each. The median variance over
+    windows, on which slips have no influence while most windows have none, grows with their length
+    up to the variance of the noise, and then with the signal; the longest windows before that are
+    used. The autocorrelation is that in windows without slips.
     """
     best: tuple[float, Array] | None = None
     length = MIN_WINDOW
@@ -129,8 +113,8 @@ def correlated_noise(force: Array, white: float) -> CorrelatedNoise:
 def _fitted(residual: Array) -> tuple[float, float]:
     """Variance of white and correlated noise, and the correlation time [samples], by residuals.
 
-    Polynomials take off part of the noise, the more the longer it is correlated. So the mean
-    products of residuals are compared with those of white and of correlated noise after the same.
+    Polynomials remove part of the noise, the more the longer it is correlated. So the mean products
+    of residuals are compared with those of white and of correlated noise without polynomials.
     """
     from scipy.optimize import nnls
 
@@ -150,10 +134,10 @@ def _fitted(residual: Array) -> tuple[float, float]:
 
 
 def _products(covariance: Array) -> Array:
-    """Sums of products of residuals by lag, for noise with a covariance, after polynomials."""
+    """Sums of products of residuals around polynomials, by lag, for noise with a covariance."""
     length = len(covariance)
-    rest = _without_polynomials(_without_polynomials(covariance).T)
-    products: Array = np.array([np.trace(rest, lag) for lag in range(length // 2)])
+    residual = _without_polynomials(_without_polynomials(covariance).T)
+    products: Array = np.array([np.trace(residual, lag) for lag in range(length // 2)])
     return products
 
 
@@ -167,7 +151,7 @@ def _windows(force: Array, length: int) -> Array:
 
 
 def _without_polynomials(windows: Array) -> Array:
-    """Rows without the polynomials that describe them best."""
+    """Rows less the polynomials fitted to them."""
     grid = np.linspace(-1, 1, windows.shape[1])
     basis = np.linalg.qr(np.vander(grid, DEGREE + 1))[0]
     residual: Array = windows - (windows @ basis) @ basis.T

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-# Ratio of neighbouring intervals from which on the sampling rate has changed.
-RATE_CHANGE = 1.5
+# Minimum ratio of intervals at a change of the sampling rate.
+MIN_CHANGE = 1.5
 # Intervals over which the rate is a median, so that single gaps and jitter do not change it.
 MEDIAN_WIDTH = 9
 # Minimum samples of a part; shorter ones belong to the part before.
@@ -35,15 +35,10 @@ class Part:
 
 
 def parts_of(time: Array) -> tuple[Part, ...]:
-    """Parts of a record with one sampling interval each.
+    """Parts of a record of increasing times [s] with one sampling interval each.
 
     Filters of a number of samples run within a part. A gap does not end a part: the values on both
     sides are neighbours.
-
-    Parameters
-    ----------
-    time
-        Increasing times [s], shape (samples,).
     """
     from scipy.ndimage import median_filter
 
@@ -55,10 +50,10 @@ def parts_of(time: Array) -> tuple[Part, ...]:
         return (Part(0, len(time), interval),)
     rate = np.log(median_filter(steps, MEDIAN_WIDTH, mode="nearest"))
     bounds = [0]
-    for at in np.flatnonzero(np.abs(np.diff(rate)) > np.log(RATE_CHANGE)) + 1:
+    for at in np.flatnonzero(np.abs(np.diff(rate)) > np.log(MIN_CHANGE)) + 1:
         level = float(np.median(rate[bounds[-1] : at]))
         later = float(np.median(rate[at : at + MIN_SAMPLES]))
-        if at - bounds[-1] >= MIN_SAMPLES and abs(later - level) > np.log(RATE_CHANGE):
+        if at - bounds[-1] >= MIN_SAMPLES and abs(later - level) > np.log(MIN_CHANGE):
             bounds.append(int(at))
     if len(time) - bounds[-1] < MIN_SAMPLES and len(bounds) > 1:
         bounds.pop()

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mesoslip.analysis.experiment import Experiment, Stage
+from mesoslip.analysis.experiment_stages import Experiment, Stage
 from mesoslip.analysis.rate_and_state.motion import Loading
 from mesoslip.analysis.rate_and_state.points import Points, averaged
 from mesoslip.analysis.rate_and_state.rows import empty_row

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from mesoslip.analysis.experiment import Experiment
+from mesoslip.analysis.experiment_stages import Experiment
 from mesoslip.analysis.rate_and_state.fitting import MIN_P_VALUE, Fit, fit
 from mesoslip.analysis.rate_and_state.motion import LAWS
 from mesoslip.analysis.rate_and_state.record import Record, record_of

@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip.analysis.apparatus import Apparatus, apparatus_of
-from mesoslip.analysis.cycles import MIN_CYCLES
 from mesoslip.analysis.even_traces import INTERVAL_TOLERANCE
 from mesoslip.analysis.noise import noise_level, without_impulses
-from mesoslip.analysis.regime.events import NO_SLIPS, Slips
+from mesoslip.analysis.regime.events import MIN_CYCLES, NO_SLIPS, Slips
 from mesoslip.analysis.regime.result import NAMES, REGIME, SMOOTH, TRANSIENT, RegimeResult
 from mesoslip.analysis.regime.rules import classify
 from mesoslip.analysis.regime.scales import Scales, measured_stage, stage_of
@@ -33,26 +32,10 @@ MAX_SAMPLES = 400_000
 
 
 def regimes(tree: xr.DataTree, name: str = "the output") -> xr.Dataset:
-    """The regime of each realization of an output, and the statistics that determine it.
+    """The variables `REGIME` of each realization of an output; ``name`` is that in messages.
 
-    Parameters
-    ----------
-    tree
-        Output of a run, or a measured trace.
-    name
-        Name in messages.
-
-    Returns
-    -------
-    xarray.Dataset
-        Dimension ``realization``, variables `REGIME`: ``regime`` is 0 smooth, 1 stick-slip, 2
-        irregular, 3 transient, with CF's flag attributes. Of a slider under a force 0 if it creeps
-        steadily in the last stage, otherwise 3, and the attribute ``motion`` describes it.
-
-    Raises
-    ------
-    FileError
-        If it has no force, or it is a run without its configuration.
+    A slider under a force is smooth if it creeps steadily in the last stage, otherwise transient,
+    and the attribute ``motion`` describes its motion.
     """
     import xarray as xr
 
@@ -71,10 +54,7 @@ def regimes(tree: xr.DataTree, name: str = "the output") -> xr.Dataset:
 
 
 def judge(tree: Tree, name: str = "the output") -> tuple[list[RegimeResult], str | None]:
-    """The regime of each realization of an output, and the motion of a slider under a force.
-
-    See `regimes`.
-    """
+    """The regime of each realization of an output, and the motion of a slider under a force."""
     root = tree.to_dataset()
     apparatus = apparatus_of(tree, name)
     owner, slips = _slips(tree)
@@ -88,7 +68,7 @@ def judge(tree: Tree, name: str = "the output") -> tuple[list[RegimeResult], str
     if config is None or not config.drive.is_force or config.slider.jumps:
         return results, None
     # With xarray.
-    from mesoslip.analysis.experiment import Experiment
+    from mesoslip.analysis.experiment_stages import Experiment
     from mesoslip.analysis.response.forces import motion_under_force
 
     motion, is_creep = motion_under_force(Experiment(tree, name))
@@ -96,7 +76,7 @@ def judge(tree: Tree, name: str = "the output") -> tuple[list[RegimeResult], str
 
 
 def _slips(tree: Tree) -> tuple[Array, Slips]:
-    """Realization of each slip, and all slips; none without a catalogue."""
+    """Realization of each slip, and all slips."""
     if "slips" not in tree.children:
         return np.empty(0), NO_SLIPS
     data = group_of(tree, "slips")
@@ -133,7 +113,7 @@ def _window(tree: Tree, number: int, apparatus: Apparatus) -> tuple[Scales, Arra
 
 
 def _even(time: Array, *values: Array) -> tuple[Array, ...]:
-    """Times and values at equal intervals: several sampling rates would weight the statistics."""
+    """Times and values at equal intervals: statistics must not depend on the sampling rates."""
     if len(time) < 2 * MIN_CYCLES:
         return time, *values
     steps = np.diff(time)

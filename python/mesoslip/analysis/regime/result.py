@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import DTypeLike
 
-from mesoslip.analysis.cycles import MIN_CYCLES
+from mesoslip.analysis.regime.events import MIN_CYCLES
 from mesoslip.output.variables import Group, Meaning
 from mesoslip.quantities import percent, with_error, with_unit
 
@@ -19,84 +20,76 @@ if TYPE_CHECKING:
 SMOOTH, STICK_SLIP, IRREGULAR, TRANSIENT = range(4)
 NAMES = ("smooth", "stick_slip", "irregular", "transient")
 
-REGIME = Group(
-    regime=Meaning(
-        "1",
-        "regime of the motion",
-        np.int8,
-        further={"flag_meanings": " ".join(NAMES)},
-    ),
-    relative_amplitude=Meaning(
-        "1",
-        "half the distance of the 5th and 95th percentiles of the force, over the static force",
-    ),
-    smooth_amplitude=Meaning(
-        "1", "upper limit for smooth sliding with N contacts, over the static force"
-    ),
-    cycles=Meaning("1", "cycles of the motion: from slip to slip, or of the force", np.int64),
-    are_slips=Meaning("1", "whether the cycles are those from slip to slip", np.int8),
-    slip_share=Meaning("1", "force drops of the slips over the loading by the drive, K v t"),
-    period=Meaning("s", "mean period of the cycles"),
-    period_variation=Meaning("1", "coefficient of variation of the periods"),
-    period_irregularity=Meaning(
-        "1", "smallest variation of the periods, allowing patterns of 2 or 3 cycles"
-    ),
-    fall_variation=Meaning("1", "coefficient of variation of the falls of the force in a cycle"),
-    fall_irregularity=Meaning(
-        "1", "smallest variation of the falls, allowing patterns of 2 or 3 cycles"
-    ),
-    peak_spread=Meaning(
-        "1", "standard deviation of the peaks of the force, over the distance of its percentiles"
-    ),
-    peak_irregularity=Meaning(
-        "1",
-        "smallest standard deviation of the peaks over the mean fall, allowing patterns of 2 or 3 "
-        "cycles",
-    ),
-    peak_correlation=Meaning("1", "correlation of each peak with the next one (the return map)"),
-    amplitude_change=Meaning("1", "change of the falls over the evaluated window, over their mean"),
-    amplitude_change_error=Meaning("1", "standard error of the amplitude change"),
-    drift=Meaning(
-        "1",
-        "change of the mean force between the halves of the evaluated window, over the static "
-        "force",
-    ),
-    fast_share=Meaning("1", "share of the time in which the slider is faster than the drive"),
-    stick_share=Meaning(
-        "1", "share of the time in which the slider has less than half the drive's velocity"
-    ),
-    slips=Meaning("1", "slips in the evaluated window", np.int64),
-    window_start=Meaning("s", "start of the evaluated window"),
-    window_end=Meaning("s", "end of the evaluated window"),
-)
+
+def _variable(
+    long_name: str,
+    units: str = "1",
+    *,
+    default: float = math.nan,
+    dtype: DTypeLike = np.float64,
+    **further: str,
+) -> Any:
+    """A field that is a variable of outputs too."""
+    return field(
+        default=default, metadata={"meaning": Meaning(units, long_name, dtype, further=further)}
+    )
 
 
 @dataclass(frozen=True)
 class RegimeResult:
-    """The regime of a realization and the statistics that determine it, see `REGIME`."""
+    """The regime of a realization and the statistics that determine it."""
 
-    regime: int = TRANSIENT
-    relative_amplitude: float = math.nan
-    smooth_amplitude: float = math.nan
-    cycles: int = 0
-    are_slips: bool = False
-    slip_share: float = math.nan
-    period: float = math.nan
-    period_variation: float = math.nan
-    period_irregularity: float = math.nan
-    fall_variation: float = math.nan
-    fall_irregularity: float = math.nan
-    peak_spread: float = math.nan
-    peak_irregularity: float = math.nan
-    peak_correlation: float = math.nan
-    amplitude_change: float = math.nan
-    amplitude_change_error: float = math.nan
-    drift: float = math.nan
-    fast_share: float = math.nan
-    stick_share: float = math.nan
-    slips: int = 0
-    window_start: float = math.nan
-    window_end: float = math.nan
+    regime: int = _variable(
+        "regime of the motion", default=TRANSIENT, dtype=np.int8, flag_meanings=" ".join(NAMES)
+    )
+    relative_amplitude: float = _variable(
+        "half the distance of the 5th and 95th percentiles of the force, over the static force"
+    )
+    smooth_amplitude: float = _variable(
+        "upper limit for smooth sliding with N contacts, over the static force"
+    )
+    cycles: int = _variable(
+        "cycles of the motion: from slip to slip, or of the force", default=0, dtype=np.int64
+    )
+    are_slips: bool = _variable(
+        "whether the cycles are those from slip to slip", default=False, dtype=np.int8
+    )
+    slip_share: float = _variable("force drops of the slips over the loading by the drive, K v t")
+    period: float = _variable("mean period of the cycles", "s")
+    period_variation: float = _variable("coefficient of variation of the periods")
+    period_irregularity: float = _variable(
+        "smallest variation of the periods, allowing patterns of 2 or 3 cycles"
+    )
+    fall_variation: float = _variable(
+        "coefficient of variation of the falls of the force in a cycle"
+    )
+    fall_irregularity: float = _variable(
+        "smallest variation of the falls, allowing patterns of 2 or 3 cycles"
+    )
+    peak_spread: float = _variable(
+        "standard deviation of the peaks of the force, over the distance of its percentiles"
+    )
+    peak_irregularity: float = _variable(
+        "smallest standard deviation of the peaks over the mean fall, allowing patterns of 2 or 3 "
+        "cycles"
+    )
+    peak_correlation: float = _variable(
+        "correlation of each peak with the next one (the return map)"
+    )
+    amplitude_change: float = _variable(
+        "change of the falls over the evaluated window, over their mean"
+    )
+    amplitude_change_error: float = _variable("standard error of the amplitude change")
+    drift: float = _variable(
+        "change of the mean force between the halves of the evaluated window, over the static force"
+    )
+    fast_share: float = _variable("share of the time in which the slider is faster than the drive")
+    stick_share: float = _variable(
+        "share of the time in which the slider has less than half the drive's velocity"
+    )
+    slips: int = _variable("slips in the evaluated window", default=0, dtype=np.int64)
+    window_start: float = _variable("start of the evaluated window", "s")
+    window_end: float = _variable("end of the evaluated window", "s")
 
     @property
     def summary(self) -> str:
@@ -126,6 +119,10 @@ class RegimeResult:
             name: np.dtype(meaning.dtype).type(getattr(self, name)).item()
             for name, meaning in REGIME.items()
         }
+
+
+# The variables of outputs.
+REGIME = Group({one.name: one.metadata["meaning"] for one in fields(RegimeResult)})
 
 
 def results_of(data: xr.Dataset) -> list[RegimeResult]:

@@ -8,16 +8,17 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mesoslip.analysis.cycles import (
+from mesoslip.analysis.regime.events import (
     MIN_CYCLES,
+    Slips,
     correlation,
     defined,
+    events_of,
     find_cycles,
     irregularity,
     trend,
     variation,
 )
-from mesoslip.analysis.regime.events import Slips, events_of
 from mesoslip.analysis.regime.result import IRREGULAR, SMOOTH, STICK_SLIP, TRANSIENT, RegimeResult
 from mesoslip.analysis.regime.scales import Scales
 
@@ -27,22 +28,23 @@ Array = NDArray[np.float64]
 SMOOTH_AMPLITUDE = 0.02
 # Percentiles of the force; the amplitude is half their distance.
 LOW, HIGH = 5.0, 95.0
-# Minimum mean force that amplitudes are divided by, over the static force.
+# Minimum scale of amplitudes, over the static force; above it the scale is the mean force.
 MIN_MEAN = 0.05
-# Reversal of the force that ends a cycle, over the distance of the percentiles, and the maximum
-# excursion beyond the percentiles that counts, such as the rebound of a slip.
+# Minimum reversal of the force that ends a cycle, over the distance of the percentiles, and maximum
+# distance beyond the percentiles: the force is clipped there, such as in the rebound of a slip.
 TURNING = 0.5
 MAX_EXCURSION = 0.1
 # Maximum variation of periods, and of the falls of the force in a cycle, of stick-slip; and a
 # smaller one where the peaks of the force vary by more than a part of the mean fall.
 IRREGULAR_PERIODS = IRREGULAR_FALLS = 0.3
 IRREGULAR_PEAKS, WITH_PEAKS = 0.07, 0.2
-# Maximum variations of an oscillation that is not noise, though as small.
+# Maximum variations of an oscillation with the amplitude of noise.
 REGULAR_PERIODS = 0.15
 REGULAR_FALLS = 0.2
-# A motion is transient if its falls change by more than this fraction, and by as many standard
+# A motion is transient if its falls change by more than MAX_CHANGE, and by SIGNIFICANCE standard
 # errors; if one half of the window is smooth and the amplitude of the other exceeds the limit of
-# smooth sliding by this factor; or if an oscillation has so much more amplitude in one half.
+# smooth sliding by SMOOTH_FACTOR; or if the amplitudes of an oscillation in the halves differ by
+# HALVES_FACTOR.
 MAX_CHANGE = 0.1
 SIGNIFICANCE = 4.0
 SMOOTH_FACTOR = 1.5
@@ -55,17 +57,9 @@ STICKING = 0.5
 def classify(
     scales: Scales, time: Array, force: Array, velocity: Array, slips: Slips
 ) -> RegimeResult:
-    """The regime of a motion.
+    """The regime of a motion by its evaluated window and the slips of the realization.
 
-    Parameters
-    ----------
-    scales
-        Its scales.
-    time, force, velocity
-        The evaluated window of the trace: time [s], force, velocity of the slider [m/s], NaN if it
-        is unknown.
-    slips
-        Slips of the realization.
+    The velocity of the slider [m/s] is NaN if it is unknown.
     """
     if len(time) < 2 * MIN_CYCLES:
         return RegimeResult()
@@ -136,8 +130,8 @@ def classify(
 
 
 def _regime(found: RegimeResult, halves: list[float], *, regular: float, is_renewed: bool) -> int:
-    """The rules; ``halves`` are the amplitudes in the halves of the window, and ``regular`` is the
-    limit of a regular oscillation, all over the static force."""
+    """The regime by statistics, the amplitudes in the halves of the window, and the maximum
+    amplitude of a regular oscillation that is smooth, all over the static force."""
     smooth = found.smooth_amplitude
     if min(halves) <= smooth and max(halves) > SMOOTH_FACTOR * smooth:
         return TRANSIENT
@@ -163,7 +157,7 @@ def _regime(found: RegimeResult, halves: list[float], *, regular: float, is_rene
 
 
 def _scatter(values: Array) -> float:
-    """Median distance from the median, which slips do not change."""
+    """Median distance from the median, which slips hardly change."""
     return float(np.median(np.abs(values - np.median(values))))
 
 

@@ -1,4 +1,4 @@
-"""Scales of a motion: the evaluated stage of the drive, noise, and scales."""
+"""Scales of a motion: the evaluated stage of the drive, forces, and noise."""
 
 from __future__ import annotations
 
@@ -15,10 +15,11 @@ from mesoslip.output.arrays import Tree
 
 Array = NDArray[np.float64]
 
-# Noise of N contacts in steady sliding (0.6 N^(-1/2)) over the static force, with a margin.
+# Amplitude of the noise of N contacts in steady sliding over the static force, times N^(1/2): 0.6,
+# with a margin.
 NOISE_AMPLITUDE = 0.8
-# The same for the noise of a measured trace, over its standard deviation: the percentiles of normal
-# noise lie at 1.64 of it.
+# Amplitude of measured noise over its standard deviation: the percentiles of normal noise are at
+# 1.64, with a margin.
 MEASURED_NOISE_AMPLITUDE = 2.2
 
 
@@ -41,48 +42,25 @@ class Stage:
 
 @dataclass(frozen=True)
 class Scales:
-    """Scales of a motion.
-
-    Attributes
-    ----------
-    stage
-        The evaluated stage of the drive.
-    static_force
-        Static force, in the unit of the force.
-    noise_amplitude
-        Amplitude that noise gives to smooth sliding, in the unit of the force.
-    renewal_displacement
-        Displacement of the drive in which all contacts break [m]; 0 if unknown.
-    stiffness
-        Stiffness of the spring, unit of the force per metre.
-    is_rigid
-        Whether the slider moves as the drive, so that it neither sticks nor slips.
-    has_velocity
-        Whether the drive has a velocity with which that of the slider can be compared.
-    is_measured
-        Whether noise and drift may hide cycles and velocities: then slips are the cycles.
-    """
+    """Scales of a motion, forces in the unit of the apparatus."""
 
     stage: Stage
     static_force: float
     noise_amplitude: float
+    """Amplitude of smooth sliding by noise alone."""
     renewal_displacement: float
+    """Displacement of the drive in which all contacts break [m]; 0 if unknown."""
     stiffness: float
     is_rigid: bool
+    """Whether the slider moves as the drive, so that it neither sticks nor slips."""
     has_velocity: bool
+    """Whether the drive has a velocity with which that of the slider can be compared."""
     is_measured: bool = False
+    """Whether noise and drift may hide cycles and velocities: then slips are the cycles."""
 
     @classmethod
     def of_config(cls, config: Config, reached: float) -> Scales:
-        """Those of a configuration.
-
-        Parameters
-        ----------
-        config
-            The configuration.
-        reached
-            Time that the run reached [s].
-        """
+        """Scales of a configuration, for a run that reached a time [s]."""
         static = config.contacts.static_force
         noise = 0.0
         if config.contact_kind.is_discrete:
@@ -101,21 +79,9 @@ class Scales:
     def of_measurement(
         cls, apparatus: Apparatus, stage: Stage, force: Array, noise: float
     ) -> Scales:
-        """Those of a measured trace without a configuration.
+        """Scales of a measured trace without a configuration.
 
-        The static force is the maximum of the force; which displacement renews the contacts is
-        unknown.
-
-        Parameters
-        ----------
-        apparatus
-            The apparatus.
-        stage
-            The evaluated stage.
-        force
-            The evaluated force.
-        noise
-            Standard deviation of the noise of the force.
+        The static force is the maximum of the evaluated force; ``noise`` is a standard deviation.
         """
         return cls(
             stage,

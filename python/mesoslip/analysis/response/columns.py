@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from mesoslip.analysis.experiment import Stage
+from mesoslip.analysis.experiment_stages import Stage
 from mesoslip.output.variables import Group, Meaning
 
 _OUTPUT = Meaning("1", "number of the output, from 0", np.int64)

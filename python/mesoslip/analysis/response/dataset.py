@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mesoslip.analysis.experiment import Experiment
+from mesoslip.analysis.experiment_stages import Experiment
 from mesoslip.analysis.rate_and_state.measured import fitted_trend, measured_rows
 from mesoslip.analysis.rate_and_state.rows import FIT, fit_rows
 from mesoslip.analysis.response.columns import (

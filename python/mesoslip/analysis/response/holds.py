@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mesoslip.analysis.experiment import Experiment, Stage
+from mesoslip.analysis.experiment_stages import Experiment, Stage
 from mesoslip.analysis.response.columns import HOLDS, empty_row
 from mesoslip.analysis.response.line import Line, line
 from mesoslip.analysis.response.scatter import error_of_mean, scatter

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from mesoslip.analysis.experiment import Experiment, Stage
+from mesoslip.analysis.experiment_stages import Experiment, Stage
 from mesoslip.analysis.response.columns import RESTARTS, empty_row
 from mesoslip.analysis.response.forces import SAME_FORCE
 from mesoslip.analysis.response.scatter import scatter

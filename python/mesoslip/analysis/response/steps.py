@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from mesoslip.analysis.experiment import Experiment, Peak, Stage
+from mesoslip.analysis.experiment_stages import Experiment, Peak, Stage
 from mesoslip.analysis.response.columns import STEPS, empty_row
 from mesoslip.analysis.response.decay import decay
 from mesoslip.analysis.response.scatter import error_of_mean

@@ -1,4 +1,4 @@
-"""Traces whose noise a running median has taken off, and the period of their falls."""
+"""Traces after a running median, which removes noise, and the period of their falls."""
 
 from __future__ import annotations
 
@@ -24,33 +24,29 @@ WIDTHS = (1, 3, 5, 9, 17, 33, 65, 129, 257)
 
 @dataclass(frozen=True)
 class DenoisedTrace:
-    """A trace after a running median, along the drive.
-
-    ``width`` is that of the median [s], ``noise`` what it left, ``floor`` the minimum fall that
-    stands out of it, and ``white_floor`` that which stands out of the white noise.
-    """
+    """A trace after a running median, along the drive."""
 
     time: Array
     force: Array
     parts: tuple[Part, ...]
     extremes: Extremes
-    width: float
-    noise: float
-    floor: float
-    white_floor: float
+    width: float  # of the median [s]
+    noise: float  # standard deviation after the median
+    floor: float  # minimum fall above the noise
+    white_floor: float  # minimum fall above the white noise
     period: float
 
     def on_samples(
         self, force: Array, tops: Samples, bottoms: Samples
     ) -> Iterator[tuple[int, int]]:
-        """Maximum and minimum of each fall among the samples that the median joined."""
+        """Samples of the maximum and minimum of each fall in the trace before the median."""
         last = 0
         for top, bottom in zip(tops.tolist(), bottoms.tolist(), strict=True):
             part = next(one for one in self.parts if top < one.after)
             reach = round(self.width / part.interval) // 2
             start = max(last, top - reach)
             top = start + int(np.argmax(force[start : min(top + reach, bottom) + 1]))
-            # The median cuts sharp minima most: the first of ringing may be the lowest.
+            # The median removes sharp minima: in the force, the first of ringing may be lowest.
             bottom = top + 1 + int(np.argmin(force[top + 1 : bottom + reach + 1]))
             yield top, bottom
             last = bottom
@@ -64,10 +60,7 @@ class DenoisedTrace:
 def denoise(
     time: Array, force: Array, noise: float | TraceNoise, period: float | None
 ) -> DenoisedTrace | None:
-    """The trace after a running median of the width that noise and falls demand.
-
-    None if no fall stands out.
-    """
+    """The trace after a running median as wide as noise and falls demand; None without falls."""
     parts = parts_of(time)
     interval = max(parts, key=len).interval
     white = noise.deviation if isinstance(noise, TraceNoise) else noise
@@ -76,10 +69,10 @@ def denoise(
         if found is not None and width * interval > found.period / 4:
             break
         filtered = _running_median(force, parts, width * interval)
-        rest = _after_median(noise, width, interval)
+        remaining = _after_median(noise, width, interval)
         height = MIN_HEIGHT * float(np.ptp(filtered))
         size = _noise_range(len(force) / width)
-        floor = max(size * rest, height)
+        floor = max(size * remaining, height)
         extremes = extremes_of(filtered)
         tops, bottoms = extremes.falls(floor)
         tops, bottoms = tops[tops > 0], bottoms[tops > 0]
@@ -92,21 +85,21 @@ def denoise(
                     parts=parts,
                     extremes=extremes,
                     width=width * interval,
-                    noise=rest,
+                    noise=remaining,
                     floor=floor,
                     white_floor=max(size * _after_median(white, width, interval), height),
                     period=own,
                 )
-        if size * rest <= height or width >= len(force) // 8:
+        if size * remaining <= height or width >= len(force) // 8:
             break
     return found
 
 
 def _after_median(noise: float | TraceNoise, width: int, interval: float) -> float:
-    """Standard deviation of noise after a running median over so many samples.
+    """Standard deviation of noise after a running median over a width [samples].
 
-    The variance of a median is pi/2 times that of a mean, in which there are as many independent
-    values of correlated noise as there are twice its correlation time in the width.
+    The variance of a median is pi/2 times that of a mean. The number of independent values of
+    correlated noise is the width over twice the correlation time.
     """
     if isinstance(noise, TraceNoise):
         white, correlated = noise.deviation, noise.correlated_deviation
@@ -120,12 +113,12 @@ def _after_median(noise: float | TraceNoise, width: int, interval: float) -> flo
 
 
 def _noise_range(count: float) -> float:
-    """Range that so many values of normal noise hardly exceed, in standard deviations."""
+    """Range that a number of values of normal noise hardly exceeds, in standard deviations."""
     return 2 * math.sqrt(2 * math.log(max(count, 2.0))) + 1
 
 
 def _running_median(force: Array, parts: Sequence[Part], duration: float) -> Array:
-    """Medians over a duration, within each part."""
+    """Medians over a duration [s], within each part."""
     from scipy.ndimage import median_filter
 
     filtered = force.copy()
@@ -149,7 +142,7 @@ def _period(time: Array, force: Array, tops: Samples, bottoms: Samples) -> float
         part = (force[top : bottom + 1] - force[bottom]) / (force[top] - force[bottom])
         high = int(np.flatnonzero(part >= 1 - MARGIN)[-1])
         low = high + int(np.flatnonzero(part[high:] <= MARGIN)[0])
-        # Interpolated between the samples around each crossing.
+        # Crossings are interpolated between samples.
         above = (part[high] - (1 - MARGIN)) / (part[high] - part[high + 1])
         below = (MARGIN - part[low]) / (part[low - 1] - part[low])
         at = time[top : bottom + 1]

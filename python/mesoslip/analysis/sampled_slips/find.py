@@ -1,4 +1,4 @@
-"""Find the slips in a trace."""
+"""Find the slips in a trace, by a minimum fall at the plateau of their number."""
 
 from __future__ import annotations
 
@@ -10,46 +10,54 @@ from numpy.typing import NDArray
 
 from mesoslip.analysis.alternating_extremes import Samples
 from mesoslip.analysis.noise import TraceNoise, estimate_noise
-from mesoslip.analysis.sampled_slips.counts import SlipCounts, count_slips
 from mesoslip.analysis.sampled_slips.denoised import denoise
 from mesoslip.analysis.sampled_slips.search import SlipSearch, is_loaded
 
 Array = NDArray[np.float64]
 
+# Ratio of thresholds for which slips are counted.
+THRESHOLD_RATIO = 1.25
+# A plateau: maximum change of the count, and minimum ratio of its thresholds.
+MAX_CHANGE, MIN_PLATEAU = 0.1, 1.5
+# Minimum number of slips at the plateau, over that at the lowest threshold.
+MIN_KEPT = 0.5
+
+
+@dataclass(frozen=True)
+class SlipCounts:
+    """How the number of slips depends on the minimum fall, arrays of shape (thresholds,)."""
+
+    threshold: Array = field(default_factory=lambda: np.empty(0))
+    """Minimum falls, in the unit of the force."""
+    count: NDArray[np.int_] = field(default_factory=lambda: np.empty(0, dtype=int))
+    plateau: tuple[float, float] | None = None
+    """First and last minimum fall of the range in which the number hardly changes, if any."""
+
 
 @dataclass(frozen=True)
 class FoundSlips:
-    """Slips in a trace, each array of shape (slips,).
-
-    Attributes
-    ----------
-    start_time, end_time
-        Times of the maximum before and of the minimum after [s].
-    force_before, force_after
-        Forces at these times, averaged over the noise as far as the trace allows [N].
-    fall_rate
-        Maximum rate of fall [N/s].
-    first, last
-        Samples of the maximum and of the minimum.
-    min_fall
-        Minimum fall of a slip [N].
-    period
-        Period of the setup that was given, or twice the duration of deep falls [s]; infinite
-        without falls.
-    counts
-        Slips by minimum fall; empty if noise or minimum fall were given.
-    """
+    """Slips in a trace, each array of shape (slips,)."""
 
     start_time: Array
+    """Times of the maximum before [s]."""
     end_time: Array
+    """Times of the minimum after [s]."""
     force_before: Array
+    """Forces at the start, averaged over the noise as far as the trace allows [N]."""
     force_after: Array
     fall_rate: Array
+    """Maximum rate of fall [N/s]."""
     first: Samples
+    """Samples of the maximum before."""
     last: Samples
+    """Samples of the minimum after."""
     min_fall: float = 0.0
+    """Minimum fall of a slip [N]."""
     period: float = math.inf
+    """Given period of the setup, or twice the duration of deep falls [s]; infinite without falls.
+    """
     counts: SlipCounts = field(default_factory=SlipCounts)
+    """Slips by minimum fall; empty if noise or minimum fall were given."""
 
     def __len__(self) -> int:
         return len(self.start_time)
@@ -65,26 +73,13 @@ def find_slips(
     min_fall: float | None = None,
     loading_rate: float | None = None,
 ) -> FoundSlips:
-    """Find the slips in a trace.
+    """Find the slips in a trace of increasing times [s] and finite forces [N], or coefficients.
 
-    Parameters
-    ----------
-    time
-        Increasing times [s], shape (samples,).
-    force
-        Force of the spring [N], or a friction coefficient, shape (samples,), finite.
-    noise
-        The result of `estimate_noise`, called by default. A number is the standard deviation of
-        white noise [N]: then nothing is taken off, and the minimum fall follows from it.
-    period
-        Period of the setup, 2 pi (M/K)^1/2 [s]; by default twice the duration of deep falls.
-    direction
-        Sign of the drive's velocity.
-    min_fall
-        Minimum fall of a slip [N]; by default from the noise and the number of slips.
-    loading_rate
-        Rate at which the force of a slider at rest grows, stiffness times velocity of the drive
-        [N/s]; by default that of rises of the trace.
+    The noise is estimated by default. If it is a number, the standard deviation of white noise,
+    nothing is removed and the minimum fall follows from it. The period of the setup, 2 pi
+    (M/K)^1/2, is by default twice the duration of deep falls [s]; the minimum fall follows from the
+    noise and the number of slips; the rate at which the force of a slider at rest grows is that of
+    the rises of the trace [N/s]. The direction is the sign of the drive's velocity.
     """
     force = direction * np.asarray(force, dtype=float)
     if len(force) < 4:
@@ -138,6 +133,29 @@ def find_slips(
     )
 
 
+def count_slips(search: SlipSearch) -> SlipCounts:
+    """Number of slips by threshold, and the plateau of that number.
+
+    Thresholds start at the range of the white noise: apparently correlated noise may be the trace.
+    """
+    trace = search.trace
+    deepest = float(trace.extremes.fall_sizes[-1])
+    steps = max(1, math.ceil(math.log(deepest / trace.white_floor) / math.log(THRESHOLD_RATIO)))
+    thresholds: Array = trace.white_floor * THRESHOLD_RATIO ** np.arange(steps, dtype=np.float64)
+    counts = np.array([len(search.slips(float(one))[0]) for one in thresholds])
+    for first, count in enumerate(counts):
+        same = np.abs(counts[first:] - count) <= max(1.0, MAX_CHANGE * count)
+        last = first + (int(np.argmin(same)) if not same.all() else len(same)) - 1
+        # A few deep falls, as at the start of a run, are no plateau.
+        if count < MIN_KEPT * counts[0]:
+            break
+        if thresholds[last] >= MIN_PLATEAU * thresholds[first]:
+            return SlipCounts(
+                thresholds, counts, (float(thresholds[first]), float(thresholds[last]))
+            )
+    return SlipCounts(thresholds, counts)
+
+
 def estimated_period(time: Array, force: Array, noise: float) -> float:
     """Period of the setup [s], estimated from the deepest falls of a trace; infinite without falls.
 
@@ -160,8 +178,8 @@ def _ends(
     time: Array, force: Array, top: int, bottom: int, noise: float, half: int
 ) -> tuple[float, float, float, float]:
     """Samples of start and end of a slip, and the forces there, averaged over the noise."""
-    # The force grows slowly before a slip, so that noise decides which sample is the maximum. The
-    # level is that of a line through the samples before, and the slip starts where means over
+    # The force grows slowly before a slip, so that noise determines which sample is the maximum.
+    # The level is that of a line through the samples before, and the slip starts where means over
     # some samples fall below it.
     wide = max(1, min(half // 4, (bottom - top) // 3))
     low = max(0, top - max(4, half))

@@ -17,21 +17,21 @@ Array = NDArray[np.float64]
 MIN_FALL_RATIO = 2.0
 # Maximum time from a minimum to a maximum in ringing, in half periods of the setup.
 MAX_RISE = 1.5
-# Part of the loading before a slip that counts as ringing.
+# Part of a rise by loading that counts as ringing.
 LOADING_PART = 0.25
 # Maximum rate of loading over that of spring and drive, and over the median rate of rises where
 # these are unknown.
 MAX_LOADING, MAX_RISING = 1.1, 3.0
 # Contribution of noise to the difference of a maximum and a minimum, in standard deviations.
 EXTREME_NOISE = 4.0
-# Minimum rate of fall, in 2 pi over the period times the deepest fall.
+# Minimum rate of fall over 2 pi/period times the deepest fall.
 MIN_RATE = 0.015
 # Minimum rate of a fall over its depth, over that of the deep falls.
 MIN_STEEPNESS = 0.15
 # Upper part of a fall, over its depth, in which its duration is compared with that of the rise.
 UPPER = (0.5, 0.9)
-# Minimum duration of the rise over that of the fall, and that of rises which are loading in the
-# median over the slips of a trace.
+# Minimum duration of the rise over that of the fall: of each slip, and in the median over the slips
+# of a trace if rises are loading.
 MIN_RISE, LOADING_RISE = 0.5, 8.0
 # Minimum share of slips among deep falls, and minimum number of slips, where rises are not much
 # slower than falls.
@@ -79,7 +79,7 @@ class SlipSearch:
         is_loading = (regained <= self._max_rising * duration) & (duration >= trace.period / 4)
         is_loading &= ~_decaying(time[tops], time[bottoms], drop, trace.period)
         regained = np.where(is_loading, LOADING_PART * regained, regained)
-        # Noise increases both, as they are differences of extremes.
+        # Both are differences of extremes, which noise increases.
         excess = np.minimum(drop, EXTREME_NOISE * trace.noise)
         found = drop - excess > MIN_FALL_RATIO * np.maximum(regained - excess, 0.0)
         found &= rates > self._min_rate
@@ -99,7 +99,7 @@ class SlipSearch:
         return tops.size >= MIN_SHARE * all_tops.size
 
     def _joined(self, tops: Samples, bottoms: Samples) -> tuple[Samples, Samples]:
-        """Falls with those that belong to them."""
+        """Falls, each with the following ones that belong to it."""
         force, time, half = self.trace.force, self.trace.time, self.trace.period / 2
         joined: list[tuple[int, int]] = []
         for top, bottom in zip(tops.tolist(), bottoms.tolist(), strict=True):
@@ -128,7 +128,7 @@ def _rates(trace: DenoisedTrace) -> Array:
         half = max(1, round(trace.period / 2 / part.interval))
         # Wide enough to average over noise, narrow enough for ringing faster than the setup's.
         width = min(2 * max(1, half // 8) + 1, len(part) - 1 + len(part) % 2)
-        # The slope of a line through so many samples.
+        # Weights of the slope of a line through the samples.
         at = np.arange(width) - width // 2
         weights = at / (np.sum(at**2) * part.interval)
         rates[part.samples] = correlate1d(trace.force[part.samples], weights, mode="nearest")
@@ -141,7 +141,7 @@ def _rising_rate(trace: DenoisedTrace, tops: Samples, bottoms: Samples) -> float
     if tops.size == 0:
         return math.inf
     depth = np.sort(force[tops] - force[bottoms])
-    # Half of all falling is in falls of at least this depth.
+    # Half of the sum of depths is in falls of at least this depth.
     typical = float(depth[np.searchsorted(np.cumsum(depth), 0.5 * depth.sum())])
     tops, bottoms = trace.extremes.falls(typical / 2)
     if tops.size < 2:
@@ -154,8 +154,10 @@ def _rising_rate(trace: DenoisedTrace, tops: Samples, bottoms: Samples) -> float
 
 
 def _rise_ratios(trace: DenoisedTrace, tops: Samples, bottoms: Samples) -> Array:
-    """Duration of the rise to the maximum of each fall over that of the fall, at most twice
-    `LOADING_RISE`, both in the upper part of the fall."""
+    """Duration of the rise to the maximum of each fall over that of the fall, in the upper part.
+
+    The ratio is at most twice `LOADING_RISE`.
+    """
     force, time, most = trace.force, trace.time, 2 * LOADING_RISE
     ratios = np.full(len(tops), most)
     for number, (top, bottom) in enumerate(zip(tops.tolist(), bottoms.tolist(), strict=True)):
@@ -173,7 +175,7 @@ def _rise_ratios(trace: DenoisedTrace, tops: Samples, bottoms: Samples) -> Array
 
 
 def is_loaded(trace: DenoisedTrace, tops: Samples, bottoms: Samples) -> bool:
-    """Whether the rises before slips are slow, as those of loading: the median of deep ones."""
+    """Whether the rises before deep slips are slow in the median, as those of loading."""
     if tops.size == 0:
         return False
     drop = trace.force[tops] - trace.force[bottoms]
@@ -182,7 +184,7 @@ def is_loaded(trace: DenoisedTrace, tops: Samples, bottoms: Samples) -> bool:
 
 
 def _decaying(start: Array, end: Array, drop: Array, period: float) -> NDArray[np.bool_]:
-    """Falls of oscillations that only decay, until the trace is quiet."""
+    """Whether each fall is of an oscillation that only decays, until the trace is quiet."""
     found = np.zeros(len(drop), dtype=bool)
     gaps = np.flatnonzero(start[1:] - end[:-1] > MAX_RISE * period / 2) + 1
     for first, after in itertools.pairwise([0, *gaps.tolist(), len(drop)]):

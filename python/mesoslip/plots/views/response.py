@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from mesoslip.analysis.experiment import Experiment
+from mesoslip.analysis.experiment_stages import Experiment
 from mesoslip.analysis.rate_and_state import LAWS, MAX_MISFIT, Fit, Record, fit, record_of
 from mesoslip.analysis.response import healing_line, response_of, steady_line
 from mesoslip.errors import RunError

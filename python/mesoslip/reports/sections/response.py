@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from mesoslip.analysis import response as responses
-from mesoslip.analysis.experiment import Experiment
+from mesoslip.analysis.experiment_stages import Experiment
 from mesoslip.errors import FileError
 from mesoslip.reports.content import Block, Section, Subject, Table, Text
 from mesoslip.reports.sections.base import named, picture_of

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import xarray as xr
 
-from mesoslip.analysis import avalanches, response, slip_tables, slips
+from mesoslip.analysis import avalanches, response, slips
 from mesoslip.configuration.reading import PathLike, as_path
 from mesoslip.errors import FileError
 from mesoslip.output.table_files import is_printed, write_printed
@@ -36,7 +36,7 @@ def write_table(data: xr.Dataset | xr.DataTree, file: PathLike) -> None:
     elif isinstance(data, xr.Dataset) and "slip" in data.dims:
         catalogue = slips.catalogue_from(data)
         if for_print:
-            write_printed([slip_tables.printed(catalogue)], path)
+            write_printed([catalogue.printed()], path)
         else:
             catalogue.write_csv(path)
     elif isinstance(data, xr.Dataset) and "avalanche" in data.dims:

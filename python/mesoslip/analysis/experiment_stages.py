@@ -1,4 +1,4 @@
-"""An output as an experiment on friction: its trace, stage by stage of the drive."""
+"""An output as a friction experiment: its trace, stage by stage of the drive."""
 
 from __future__ import annotations
 
@@ -30,32 +30,15 @@ Array = NDArray[np.float64]
 PEAK_STRETCHES = 3.0
 # Minimum share of the slider's displacement in slips for a stage of stick-slip.
 STICK_SLIP_SHARE = 0.1
-# Relative tolerance of times: those of samples and stages are sums, equal up to rounding.
+# Relative tolerance of times: sums of intervals have rounding errors.
 TIME_TOLERANCE = 1e-9
-# Recorded properties of an extreme of the force: its value, time and displacement.
+# Recorded variables of an extreme: its force, time and displacement.
 EXTREME = ("force", "force_time", "force_displacement")
 
 
 @dataclass(frozen=True)
 class Stage:
-    """A stage of the drive.
-
-    Attributes
-    ----------
-    number
-        From 0.
-    start, end
-        Times [s].
-    start_velocity, end_velocity
-        Velocities of the drive [m/s]; of a drive by force, its rates [N/s].
-    is_uniform
-        Whether the velocity is constant or changes linearly, as in no measured history.
-    exact
-        Values from the motion itself, recorded in the output's group ``stages``, each of shape
-        (realizations,); empty if the output has no such group.
-    is_force
-        Whether the drive prescribes a force.
-    """
+    """A stage of the drive, with times [s] and velocities [m/s], or rates of its force [N/s]."""
 
     number: int
     start: float
@@ -63,8 +46,12 @@ class Stage:
     start_velocity: float
     end_velocity: float
     is_uniform: bool
+    """Whether the velocity is constant or changes linearly; not so in a history from a file."""
     exact: Mapping[str, Array]
+    """Variables of the output's group ``stages``, exact values of the motion, each of shape
+    (realizations,); empty without this group."""
     is_force: bool = False
+    """Whether the drive prescribes a force."""
 
     @property
     def duration(self) -> float:
@@ -104,56 +91,31 @@ class Stage:
 
 @dataclass(frozen=True)
 class Peak:
-    """An extreme of the force in each realization, shape (realizations,).
+    """An extreme of the force [N] in each realization, with the displacement of the slider [m].
 
-    Attributes
-    ----------
-    force, time, displacement
-        Force [N], time [s] and displacement of the slider [m].
-    is_exact
-        Whether it is that of the motion itself, not of the samples.
+    Arrays have the shape (realizations,).
     """
 
     force: Array
     time: Array
     displacement: Array
     is_exact: bool
+    """Whether the extreme is that of the motion itself, not of the samples."""
 
 
 def _is_uniform(parts: Sequence[DrivePart]) -> bool:
-    """Whether the parts of a stage have one constant velocity, or there is one part only."""
+    """Whether a stage has a single part, or parts of one constant velocity."""
     return len(parts) < 2 or len({one[1:3] for one in parts} | {parts[0][1:2] * 2}) == 1
 
 
 class Experiment:
     """An output of a run or a measured trace, analysed like the record of an experiment.
 
-    Attributes
-    ----------
-    apparatus
-        Known properties of the apparatus.
-    config
-        Configuration of the run; None for a measured trace without one.
-    name
-        Name in messages and pictures.
-    time
-        Times of the samples available in all realizations [s], shape (samples,).
-    force, displacement
-        Force of the spring, in the unit of the apparatus, and displacement of the slider [m],
-        shape (realizations, samples).
-    contact_force
-        Force of the contacts of a slider under a force [N]; else that of the spring.
-    is_forced
-        Whether the drive prescribes a force, which then is the force of the spring.
-    drive
-        Displacement of the load point [m], shape (samples,).
-    stages
-        Stages of the drive reached by all realizations.
-
-    Raises
-    ------
-    FileError
-        If it has no force, its drive is unknown, or a force acts on a slider without mass.
+    It has the samples and the stages that all realizations reached. ``force`` (in the unit of the
+    apparatus), ``contact_force`` and ``displacement`` of the slider [m] have the shape
+    (realizations, samples), ``time`` [s] and the displacement ``drive`` of the load point [m] the
+    shape (samples,). If the drive prescribes a force (``is_forced``), that is the force, and the
+    contact force differs from it.
     """
 
     def __init__(self, tree: Tree, name: str = "the output") -> None:
@@ -183,8 +145,7 @@ class Experiment:
         self.stages = self._stages()
 
     def _drive(self, root: xr.Dataset | Arrays) -> Array:
-        """Displacement of the load point [m]; of a measured trace without one that of a constant
-        velocity."""
+        """Displacement of the load point [m], as recorded or by the velocity of the drive."""
         if "drive_displacement" in root:
             drive: Array = root["drive_displacement"].values[0]
             if np.isfinite(drive).any():
@@ -199,8 +160,10 @@ class Experiment:
         return self.apparatus.velocity * elapsed
 
     def _displacement(self, root: xr.Dataset | Arrays, count: int) -> Array:
-        """Displacement of the slider [m]: recorded, or the load point less the stretch of the
-        spring, or that of the load point if the stiffness is unknown."""
+        """Displacement of the slider [m]: recorded, or from load point and stretch of the spring.
+
+        If the stiffness is unknown, the stretch is taken as 0.
+        """
         if "displacement" in root:
             displacement: Array = root["displacement"].values[:, :count]
             if np.isfinite(displacement).any():
@@ -214,12 +177,9 @@ class Experiment:
         return math.nan if self.config is None else self.config.contacts.static_force
 
     def without_trend(self, trend: float) -> Experiment:
-        """The experiment without a linear trend of the force along the drive.
+        """The experiment without a linear trend of the force over the displacement of the slider.
 
-        Parameters
-        ----------
-        trend
-            Increase of the force over the displacement of the slider, unit of the force per metre.
+        The trend is in the unit of the force per metre.
         """
         changed = copy.copy(self)
         changed.__dict__.pop("steady_means", None)
@@ -228,20 +188,14 @@ class Experiment:
         return changed
 
     def with_stiffness(self, stiffness: float) -> Experiment:
-        """The experiment with another stiffness of the spring.
-
-        Parameters
-        ----------
-        stiffness
-            K, unit of the force per metre.
-        """
+        """The experiment with another stiffness, in the unit of the force per metre."""
         changed = copy.copy(self)
         changed.apparatus = dataclasses.replace(self.apparatus, stiffness=stiffness)
         return changed
 
     @property
     def is_measured(self) -> bool:
-        """Whether it is a measured trace, and no run."""
+        """Whether it is a measured trace, not a run."""
         return is_measured(self.tree)
 
     @property
@@ -251,8 +205,10 @@ class Experiment:
 
     @property
     def peak_window(self) -> float:
-        """Displacement of the slider after a change of the drive in which its peak is searched
-        [m]; infinite without a configuration, so that the whole stage is searched."""
+        """Displacement of the slider after a change of the drive within which its peak lies [m].
+
+        Infinite without a configuration: then the whole stage is searched.
+        """
         if self.config is None:
             return math.inf
         return PEAK_STRETCHES * self.config.contacts.break_stretch
@@ -290,7 +246,7 @@ class Experiment:
         return parts
 
     def _recorded_stages(self) -> list[Stage]:
-        """Recorded stages, of those reached by all realizations."""
+        """Recorded stages that all realizations reached."""
         data = group_of(self.tree, "stages")
         rows = {name: data[name].values for name in map(str, data.data_vars)}
         owner, numbers = rows["realization_index"], rows["stage_number"]
@@ -302,7 +258,7 @@ class Experiment:
             mine = mine[np.argsort(owner[mine], kind="stable")]
             if not np.array_equal(owner[mine], np.arange(realizations)):
                 continue
-            # The same in all realizations, unless slips end the run.
+            # Times are the same in all realizations, unless slips end the run.
             start = float(rows["stage_start_time"][mine].max())
             end = float(rows["stage_end_time"][mine].min())
             first, last = (
@@ -316,7 +272,7 @@ class Experiment:
         return found
 
     def samples(self, stage: Stage) -> slice:
-        """Samples of a stage: after its start, up to its end, the start included in the first."""
+        """Samples of a stage: after its start, up to its end; the first stage has its start too."""
         slack = TIME_TOLERANCE * max(abs(stage.end), 1e-300)
         first = int(np.searchsorted(self.time, stage.start + slack, "right"))
         if stage.number == 0:
@@ -345,7 +301,7 @@ class Experiment:
         return self.steady_means.get(stage.number)
 
     def slip_share(self, stage: Stage) -> float:
-        """Share of the slider's displacement in the steady part of a stage that happens in slips.
+        """Share of slips in the slider's displacement in the steady part of a stage.
 
         The sum of the force drops over the loading by the drive, K v t; 1 for perfect stick-slip.
         """
@@ -386,19 +342,7 @@ class Experiment:
 
         In stick-slip: the force at the start of the first slip. Otherwise the extreme while the
         slider moves by three mean breaking stretches: the recorded one, or else that of the
-        samples.
-
-        Parameters
-        ----------
-        stage
-            The stage.
-        upward
-            Whether to return the maximum.
-
-        Returns
-        -------
-        Peak or None
-            Forces are positive against the motion of the drive. None without samples.
+        samples. Forces are positive against the motion of the drive. None without samples.
         """
         sign = stage.direction
         if upward and self.is_stick_slip(stage):
@@ -425,7 +369,7 @@ class Experiment:
         )
 
     def _before_first_slip(self, stage: Stage) -> Peak | None:
-        """The starts of the first slips of a stage; None if a realization has no slip."""
+        """The start of the first slip of a stage; None if a realization has no slip."""
         slips = group_of(self.tree, "slips")
         times, owner = slips["start_time"].values, slips["realization_index"].values
         force, time, displacement = [], [], []

@@ -23,7 +23,7 @@ import pytest
 import typer
 from conftest import ROOT, long
 from mesoslip import Config
-from mesoslip.campaign.plan import Plan
+from mesoslip.campaign.sweep_plan import Plan
 from mesoslip.command_line.main import app
 from mesoslip.inference.plan import Plan as FitPlan
 from mesoslip.plots.views import VIEWS

@@ -11,7 +11,7 @@ from itertools import pairwise
 from typing import Any, Literal, get_args, get_origin
 
 import annotated_types
-from mesoslip.campaign.plan import SweepTable
+from mesoslip.campaign.sweep_table import SweepTable
 from mesoslip.configuration.config import Config
 from mesoslip.configuration.messages import tables_in
 from mesoslip.configuration.sliders import SLIDERS

@@ -10,10 +10,9 @@ import pytest
 from conftest import klein_tables
 from kinds import KINDS, configuration
 from mesoslip import Config, ConfigError
-from mesoslip.campaign import runner
-from mesoslip.campaign.plan import Plan
 from mesoslip.campaign.point import compute
-from mesoslip.campaign.runner import run_sweep
+from mesoslip.campaign.sweep import groups, run_sweep, task_of
+from mesoslip.campaign.sweep_plan import Plan
 from mesoslip.execution.stop import Stop
 from mesoslip.execution.store import Store
 from mesoslip.simulation.realization import Realization
@@ -193,15 +192,15 @@ def test_a_sweep_up_and_down(tmp_path):
         up, down = (data["mean_force"].sel(direction=one).values for one in ("up", "down"))
         assert not np.array_equal(up[:2], down[:2])
         # Without one of its points the chain is computed again, but for those that are there.
-        (group,) = runner.groups(plan)
+        (group,) = groups(plan)
         (tmp_path / f"{group.names(0)[2]}.json").unlink()
         again = run_sweep(plan, store=store, executor=mesoslip.Threads(1))
         assert (again.computed, again.stored) == (1, 5)
         np.testing.assert_array_equal(again.dataset["mean_force"], data["mean_force"])
         # Points of the start of a chain are those of a shorter one; others are not.
-        shorter = runner.groups(Plan.from_dict(sweep_tables(order="up", discard=0.0)))[0]
+        shorter = groups(Plan.from_dict(sweep_tables(order="up", discard=0.0)))[0]
         assert shorter.names(0) == group.names(0)[:3]
-        alone = runner.groups(Plan.from_dict(sweep_tables(order="down", discard=0.0)))[0]
+        alone = groups(Plan.from_dict(sweep_tables(order="down", discard=0.0)))[0]
         assert not set(alone.names(0)) & set(group.names(0))
 
 
@@ -218,7 +217,7 @@ def test_other_axes_are_other_chains():
 def test_a_failure_ends_its_chain_only():
     """What comes after it has nothing to go on from; a measure that fails ends nothing."""
     plan = Plan.from_dict(sweep_tables(order="up"))
-    task = runner.task_of(plan, runner.groups(plan)[0], 0)
+    task = task_of(plan, groups(plan)[0], 0)
     wrong = {
         **task.configs[1],
         "slider": {"kind": "layered", "mass": 1e-3, "stiffness": 97.0, "layers": 2},
@@ -227,7 +226,7 @@ def test_a_failure_ends_its_chain_only():
     first, second, third = compute(broken, Stop(None))
     assert first.measures
     assert "'rigid slider' where this version of the program has" in second.failure
-    assert third.failure == "the run from which it goes on failed"
+    assert third.failure == "the run from which it starts failed"
     raising = (
         "half",
         "def half(tree):\n    return 1 / (tree['breaks'].values[0] > 1e6)\n",
@@ -249,7 +248,7 @@ def test_a_failure_ends_its_chain_only():
         ({"continue": None, "order": "up"}, "order of sweep.continue, which is missing"),
         (
             {"run": {"duration": 0.4, "stop": {"displacement": 1e-8}}},
-            "ends a run where no other can go on",
+            "ends a run where no other can start",
         ),
         (
             {

@@ -17,7 +17,7 @@ from claims.compare import differences
 from claims.page import as_markdown, as_table
 from conftest import ROOT
 from figures import FIGURES
-from mesoslip.campaign.plan import Plan
+from mesoslip.campaign.sweep_plan import Plan
 from mesoslip.output import files, writing
 from mesoslip.quantities import with_error
 from outputs import configuration

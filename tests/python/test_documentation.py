@@ -24,7 +24,7 @@ import typer
 from conftest import ROOT, long
 from mesoslip import Config
 from mesoslip.analysis.regime.result import NAMES as REGIMES
-from mesoslip.campaign.plan import Plan
+from mesoslip.campaign.sweep_plan import Plan
 from mesoslip.command_line.main import app
 from mesoslip.configuration.contacts.tables import COUPLINGS, INITIAL_STATES
 from mesoslip.configuration.sliders import DEFAULT as DEFAULT_SLIDER

@@ -18,7 +18,7 @@ import pytest
 import xarray as xr
 from conftest import klein_tables, long
 from mesoslip import Config, ConfigError, FileError
-from mesoslip.campaign.plan import Plan
+from mesoslip.campaign.sweep_plan import Plan
 from mesoslip.execution import local
 from mesoslip.execution.executors import ThreadsThenProcesses, as_executor, completed
 from mesoslip.execution.pool import PoolError, WorkerLostError

@@ -11,10 +11,11 @@ import xarray as xr
 from conftest import ROOT
 from kinds import KINDS, configuration
 from mesoslip.configuration.differences import in_one_unit
+from mesoslip.output.kinds import KINDS as OUTPUTS
 from mesoslip.reports.content import Subject
 from mesoslip.reports.methods import curve_method, onset_method, run_method
 from mesoslip.reports.references import CITATION, PROGRAM, REFERENCES, numbered
-from mesoslip.reports.sections.methods import methods
+from mesoslip.reports.sections.methods import METHODS, methods
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -36,6 +37,10 @@ def test_every_kind_has_a_paragraph(kind):
     assert ("ω_0" in text) == (config.contacts.thermal is not None)
     assert ("lattice of" in text) == (config.interaction is not None)
     assert "2e-13 of the work" in text
+
+
+def test_every_kind_of_output_has_a_paragraph():
+    assert set(METHODS) == set(OUTPUTS)
 
 
 def test_numbers_of_kleins_case():

@@ -21,10 +21,10 @@ import xarray as xr
 from conftest import ROOT, klein_tables, long
 from mesoslip import Config, ConfigError, FileError
 from mesoslip.analysis.regime import REGIME, regimes
-from mesoslip.campaign import runner
 from mesoslip.campaign.measures import MEASURES
-from mesoslip.campaign.plan import Plan
 from mesoslip.campaign.point import Outcome, combination_key, point_name
+from mesoslip.campaign.sweep import groups, run_sweep, stored_body, stored_measures, task_of
+from mesoslip.campaign.sweep_plan import Plan
 from mesoslip.configuration.keys import key_kind
 from mesoslip.configuration.messages import all_keys
 from mesoslip.execution import local
@@ -380,7 +380,7 @@ class Backwards(Executor, Pool):
 
 def test_the_order_does_not_matter(whole):
     plan = Plan.from_dict(tables(realizations=3))
-    assert_same_numbers(whole, runner.run_sweep(plan, executor=Backwards()).dataset)
+    assert_same_numbers(whole, run_sweep(plan, executor=Backwards()).dataset)
 
 
 def test_threads_hand_over_to_processes(whole, monkeypatch):
@@ -401,7 +401,7 @@ def test_threads_hand_over_to_processes(whole, monkeypatch):
 
 def done_by(plan, store, executor=None):
     with Store(store, "points") as opened:
-        return runner.run_sweep(plan, store=opened, executor=executor or mesoslip.Threads(2))
+        return run_sweep(plan, store=opened, executor=executor or mesoslip.Threads(2))
 
 
 def test_only_what_is_missing_is_computed(tmp_path, whole):
@@ -475,11 +475,11 @@ def test_damaged_points_count_as_missing(damage, tmp_path):
 )
 def test_a_point_that_is_none_counts_as_missing(content, tmp_path):
     plan = Plan.from_dict(tables())
-    name = runner.task_of(plan, runner.groups(plan)[0], 0).names[0]
+    name = task_of(plan, groups(plan)[0], 0).names[0]
     with Store(tmp_path, "points") as store:
         (tmp_path / f"{name}.json").write_bytes(content)
         assert store.names() == {name}
-        assert runner.stored_measures(store, plan, name) is None
+        assert stored_measures(store, plan, name) is None
 
 
 @pytest.mark.parametrize(
@@ -488,21 +488,21 @@ def test_a_point_that_is_none_counts_as_missing(content, tmp_path):
 def test_measures_that_are_no_numbers_count_as_missing(measures, tmp_path):
     """Though the point is whole, with a checksum."""
     plan = Plan.from_dict(tables())
-    name = runner.task_of(plan, runner.groups(plan)[0], 0).names[0]
+    name = task_of(plan, groups(plan)[0], 0).names[0]
     with Store(tmp_path, "points") as store:
         store.write(name, {"measures": measures})
         assert store.read(name) is not None
-        assert runner.stored_measures(store, plan, name) is None
+        assert stored_measures(store, plan, name) is None
 
 
 def test_numbers_come_back_from_the_store_to_the_bit(tmp_path):
     values = {"tenth": 0.1, "least": 5e-324, "none": float("nan"), "much": float("inf")}
     plan = Plan.from_dict(tables())
-    (group, *_) = runner.groups(plan)
-    task = runner.task_of(plan, group, 0)
+    (group, *_) = groups(plan)
+    task = task_of(plan, group, 0)
     with Store(tmp_path, "points") as store:
-        store.write(task.names[0], runner.stored_body(0, Outcome(values), group.chains[0][0]))
-        back = runner.stored_measures(store, plan, task.names[0])
+        store.write(task.names[0], stored_body(0, Outcome(values), group.chains[0][0]))
+        back = stored_measures(store, plan, task.names[0])
     assert {name: np.float64(one).tobytes() for name, one in back.items()} == {
         name: np.float64(one).tobytes() for name, one in values.items()
     }
@@ -516,7 +516,7 @@ def test_outputs_of_points_on_request(tmp_path):
     assert (traced.stored, traced.computed) == (0, 6)
     assert done_by(plan, tmp_path).stored == 6
     assert done_by(Plan.from_dict(tables()), tmp_path).stored == 6
-    group = runner.groups(plan)[0]
+    group = groups(plan)[0]
     tree = mesoslip.open_output(tmp_path / f"{point_name(group.keys[0], 0)}.nc")
     expected = mesoslip.run(group.chains[0][0].config)
     np.testing.assert_array_equal(tree["spring_force"], expected["spring_force"])
@@ -715,7 +715,7 @@ def test_a_stopped_sweep_keeps_what_it_has(tmp_path):
             stop.set()
 
     with Store(tmp_path, "points") as store:
-        part = runner.run_sweep(plan, store=store, executor=1, progress=until_five, stop=stop)
+        part = run_sweep(plan, store=store, executor=1, progress=until_five, stop=stop)
     assert (part.computed, part.missing, part.complete) == (5, 13, False)
     assert np.sum(part.dataset["status"].values == 2) == 13
     assert part.dataset.attrs["complete"] == "false"

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from conftest import klein_tables
 from mesoslip import Config, FileError, RunError
-from mesoslip.campaign.plan import Plan
+from mesoslip.campaign.sweep_plan import Plan
 from mesoslip.execution.stop import Stop
 from mesoslip.execution.store import Store
 from mesoslip.output.tree import build_tree

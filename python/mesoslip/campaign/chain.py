@@ -1,18 +1,15 @@
-"""Chains of runs: along one axis of a sweep each run goes on from the end of the last one."""
+"""Chains of runs: along one axis of a sweep each run starts from the end of the one before."""
 
 from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
 
 from mesoslip.campaign.combination import Axis, Combination
+from mesoslip.campaign.measures import Measure
+from mesoslip.campaign.sweep_table import SweepTable
 from mesoslip.errors import Problem
 from mesoslip.simulation.start import CONTINUED
-
-if TYPE_CHECKING:
-    from mesoslip.campaign.measures import Measure
-    from mesoslip.campaign.plan import SweepTable
 
 # Dimension of the order of a chain that goes up and down again, and its values.
 DIRECTION = "direction"
@@ -51,7 +48,7 @@ def with_directions(axes: Sequence[Axis], sweep: SweepTable) -> tuple[Axis, ...]
 
 
 def unchained(combinations: Sequence[Combination], key: str, source: str) -> Iterator[Problem]:
-    """Why runs cannot go on from the end of another."""
+    """Why runs cannot start from the end of another."""
     configs = [one.config for one in combinations]
     if key == "slider.stiffness":
         kind = next((one.slider.kind for one in configs if one.slider.oscillator is None), None)
@@ -66,7 +63,7 @@ def unchained(combinations: Sequence[Combination], key: str, source: str) -> Ite
         value = next((one for one in values if one is not None), None)
         if value is not None:
             message = (
-                "ends a run where no other can go on; with sweep.continue a run ends with its "
+                "ends a run where no other can start; with sweep.continue a run ends with its "
                 "duration, run.stop.slips or run.stop.steady"
             )
             yield Problem(source, name, message, value)
@@ -79,7 +76,7 @@ def chained(
     along = next(at for at, axis in enumerate(axes) if axis.keys == (sweep.continue_,))
     values = [row[0] for row in axes[along].rows]
     ascending = sorted(range(len(values)), key=lambda number: values[number])
-    place = {number: at for at, number in enumerate(ascending)}
+    rank = {number: at for at, number in enumerate(ascending)}
     within = {along, *(at for at, axis in enumerate(axes) if axis.dimension == DIRECTION)}
 
     def others(one: Combination) -> tuple[int, ...]:
@@ -89,12 +86,12 @@ def chained(
         at = one.index[along]
         match sweep.order:
             case "up":
-                return 0, place[at]
+                return 0, rank[at]
             case "down":
-                return 0, -place[at]
+                return 0, -rank[at]
             case "up and down":
                 goes_down = one.index[-1]
-                return goes_down, -place[at] if goes_down else place[at]
+                return goes_down, -rank[at] if goes_down else rank[at]
             case _:
                 return 0, at
 

@@ -13,17 +13,7 @@ Value = float | int | str | bool
 
 @dataclass(frozen=True)
 class Axis:
-    """Keys that vary together.
-
-    Attributes
-    ----------
-    dimension
-        Name of the dimension in the dataset.
-    keys
-        Dotted names.
-    rows
-        The values of the keys at each index of the axis, in SI.
-    """
+    """Keys that vary together, with a row of their values, in SI, for each index."""
 
     dimension: str
     keys: tuple[str, ...]
@@ -32,24 +22,11 @@ class Axis:
 
 @dataclass(frozen=True)
 class Combination:
-    """One combination of values.
-
-    Attributes
-    ----------
-    index
-        Its index along each axis.
-    values
-        The value of each swept key, in SI.
-    config
-        The configuration.
-    """
+    """A configuration, with its index along each axis and the swept values, in SI, by key."""
 
     index: tuple[int, ...]
     values: Mapping[str, Value]
     config: Config
-
-    def __str__(self) -> str:
-        return described(self.values)
 
 
 def described(values: Mapping[str, Value]) -> str:

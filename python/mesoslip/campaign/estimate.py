@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from mesoslip.campaign.combination import Combination
-from mesoslip.campaign.plan import Plan
-from mesoslip.campaign.runner import groups, stored_measures
+from mesoslip.campaign.sweep import groups, stored_measures
+from mesoslip.campaign.sweep_plan import Plan
 from mesoslip.execution.store import Pieces
 from mesoslip.simulation.realization import Realization
 from mesoslip.simulation.recorded_tables import COLUMNS
@@ -29,19 +29,7 @@ COMPRESSED = 0.5
 
 @dataclass(frozen=True)
 class Estimate:
-    """Expected time, memory and disk of a sweep.
-
-    Attributes
-    ----------
-    points, stored
-        Number of all points, and of those in the store.
-    seconds
-        Wall time of the missing points.
-    memory_bytes
-        Memory of all processes.
-    disk_bytes
-        Disk space of the points and the dataset.
-    """
+    """Number of points, of those stored, wall time of the missing ones, memory and disk space."""
 
     points: int
     stored: int
@@ -51,15 +39,7 @@ class Estimate:
 
 
 def estimate(plan: Plan, store: Pieces, workers: int) -> Estimate:
-    """Estimate time, memory and disk of a sweep from the first moments of some combinations.
-
-    Raises
-    ------
-    ConfigError
-        If a combination cannot be run.
-    RunError
-        If one of the tried combinations fails.
-    """
+    """Estimate time, memory and disk of a sweep from the first moments of some combinations."""
     there = store.names()
     missing: list[Combination] = []
     stored_count = missing_count = max_chain = 0
@@ -97,13 +77,10 @@ def estimate(plan: Plan, store: Pieces, workers: int) -> Estimate:
 
 def _seconds(combination: Combination, max_seconds: float) -> float:
     """Time that a combination takes [s], extrapolated from its start."""
-    realization = Realization(combination.config, 0)
     start = time.perf_counter()
-    try:
+    with Realization(combination.config, 0) as realization:
         while not realization.finished and time.perf_counter() - start < max_seconds:
             realization.advance(work=2e4)
-    finally:
-        realization.close()
     return (time.perf_counter() - start) / max(realization.part_done, 1e-6)
 
 

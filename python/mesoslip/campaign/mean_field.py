@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 
 # Displacement of the slider over the mean breaking stretch: until sliding is steady, and in all.
 SETTLED, LENGTH = 4.0, 10.0
-# Number of contacts for each avalanche between two looks at them: the slider moves by some
+# Contacts for each avalanche between two observations: meanwhile the slider moves by about a
 # thousandth of the mean breaking stretch.
 CONTACTS_AN_EVENT = 2000
 # Samples of the contact force.
@@ -65,7 +65,7 @@ class ContactLives:
 
     @classmethod
     def joined(cls, parts: Sequence[Sequence[Array]]) -> ContactLives:
-        """Lives of several steps or realizations, each given as the columns."""
+        """Join the lives of several steps or realizations, each given as columns."""
         return cls(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
     @property
@@ -316,7 +316,7 @@ def mean_field(config: ConfigLike) -> MeanField:
 
 
 def _sliding(config: Config) -> Config:
-    """Slow sliding of the lattice: time is of no account without delay and drag."""
+    """Slow sliding of the lattice; without delay and drag its velocity does not matter."""
     length = LENGTH * config.contacts.break_stretch
     tables = config.to_dict()
     tables["run"] = {"seed": config.run.seed, "duration": 1.0}
@@ -328,10 +328,10 @@ def _sliding(config: Config) -> Config:
 
 
 def _lives(one: Realization) -> ContactLives:
-    """Lives of the contacts of a realization, looked at after each avalanche or a few of them.
+    """Lives of the contacts of a realization, observed after each avalanche or a few of them.
 
-    The slider stands at the last of them, and breaks are where the avalanches are in the mean: with
-    one at a time, exactly. Of contacts that break twice between two looks one life is seen.
+    Breaks are placed at the mean displacement of these avalanches, exact with one at a time. Of a
+    contact that breaks twice between two observations one life is recorded.
     """
     before, displacement = one.contacts, 0.0
     birth = -before["origin"]

@@ -1,6 +1,6 @@
 """A point: one realization of one combination, identical wherever it is computed.
 
-Points of a chain are computed together, as each goes on from the end of the one before.
+Points of a chain are computed together, as each starts from the end of the one before.
 """
 
 from __future__ import annotations
@@ -14,7 +14,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mesoslip.campaign.measures import RunView, measure_of, measured
+from mesoslip.campaign.measures import RunView
+from mesoslip.campaign.user_measures import measure_of, measured
 from mesoslip.configuration.config import Config
 from mesoslip.errors import MesoslipError
 from mesoslip.execution.program import program
@@ -41,20 +42,8 @@ _HDF5 = threading.Lock()
 class Task:
     """The points of a chain for a worker, in plain values that can be sent to any process.
 
-    Attributes
-    ----------
-    names
-        Names under which the points are stored, see `point_name`.
-    configs
-        The configurations as nested tables.
-    realization
-        Number of the realization.
-    measures
-        Name, source text and file name of each measure.
-    discard
-        Fraction of the run that measures leave out.
-    trace
-        Whether the output of the run is kept.
+    It has the names under which points are stored, configurations as nested tables, and name,
+    source text and file name of each measure. Measures leave out the fraction `discard` of a run.
     """
 
     names: tuple[str, ...]
@@ -67,18 +56,9 @@ class Task:
 
 @dataclass(frozen=True)
 class Outcome:
-    """Result of a point: its measures, or the reason of its failure.
+    """Measures of a point and its computing time [s], or the reason of its failure.
 
-    Attributes
-    ----------
-    measures
-        By name.
-    seconds
-        Computing time.
-    trace
-        The content of its output file, if it is kept.
-    failure
-        Why it failed; empty if it succeeded.
+    The trace is the content of the output file, if that is kept.
     """
 
     measures: dict[str, float]
@@ -90,8 +70,8 @@ class Outcome:
 def chain_keys(
     configs: Sequence[Config], measures: Sequence[Measure], discard: float
 ) -> tuple[str, ...]:
-    """Hashes of everything that determines the measures of the combinations of a chain, except the
-    realization: with each combination those before it."""
+    """Hashes of everything that determines the measures of each combination of a chain, except the
+    realization: the combination and those before it."""
     keys: list[str] = []
     for config in configs:
         key = combination_key(config, measures, discard)
@@ -102,10 +82,8 @@ def chain_keys(
 
 
 def combination_key(config: Config, measures: Sequence[Measure], discard: float) -> str:
-    """A hash of everything that determines the measures of a combination, except the realization.
-
-    Title and number of realizations do not count.
-    """
+    """A hash of everything that determines the measures of a combination, except the realization:
+    neither the title nor the number of realizations does."""
     tables = config.to_dict()
     tables.pop("title", None)
     tables["run"] = {key: value for key, value in tables["run"].items() if key != "realizations"}
@@ -125,8 +103,10 @@ def point_name(key: str, realization: int) -> str:
 
 
 def compute(task: Task, stop: Stop) -> tuple[Outcome, ...]:
-    """Run the points of a chain and measure them. Errors are reported in the outcomes, of which
-    there are fewer than points if it was stopped."""
+    """Run the points of a chain and measure them.
+
+    Errors are reported in the outcomes. There are fewer outcomes than points after a stop.
+    """
     outcomes: list[Outcome] = []
     end: End | None = None
     for at in range(len(task.configs)):
@@ -145,7 +125,7 @@ def compute(task: Task, stop: Stop) -> tuple[Outcome, ...]:
         outcomes.append(replace(outcome, seconds=time.perf_counter() - start))
         if end is None:
             left = len(task.configs) - len(outcomes)
-            outcomes += left * [Outcome({}, failure="the run from which it goes on failed")]
+            outcomes += left * [Outcome({}, failure="the run from which it starts failed")]
             break
     return tuple(outcomes)
 
@@ -153,11 +133,13 @@ def compute(task: Task, stop: Stop) -> tuple[Outcome, ...]:
 def _compute(
     task: Task, at: int, after: End | None, stop: Stop
 ) -> tuple[Outcome | None, End | None]:
-    """Run a point of a chain from the end of the one before: its outcome, none if it was stopped,
-    and its end if another one follows."""
+    """Run a point of a chain from the end of the one before.
+
+    Returns its outcome, None if it was stopped, and its end if another point follows.
+    """
     config = Config.from_dict(task.configs[at])
     if config.output.slip_interval is None and not task.trace:
-        # No measure needs finer traces, and a file of the run is not kept.
+        # No measure needs finer traces, and no file of the run is kept.
         config = config.replace({"output.slip_interval": 0.0})
     realization = Realization(config, task.realization, after=after)
     try:

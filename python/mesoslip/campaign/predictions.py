@@ -28,8 +28,7 @@ def _configuration(tree: xr.DataTree) -> Config:
 
 
 def _steady_sliding(tree: xr.DataTree) -> LinearStability | None:
-    """Steady sliding of a run, if it can be."""
-    # It needs SciPy, which most sweeps do not.
+    # SciPy, which it imports, is not needed by most sweeps.
     from mesoslip.theory.steady_sliding import steady_sliding
 
     return steady_sliding(_configuration(tree), MAX_WORK)
@@ -42,7 +41,7 @@ def growth_rate(tree: xr.DataTree) -> float:
 
 
 def stable_out_of_step(tree: xr.DataTree) -> float:
-    """Whether steady sliding is stable, 1 or 0, also where contacts do not break in step."""
+    """Whether steady sliding is stable, 1 or 0, if contacts do not break in step either."""
     sliding = _steady_sliding(tree)
     try:
         return math.nan if sliding is None else float(sliding.is_stable_out_of_step)

@@ -19,8 +19,8 @@ from mesoslip.errors import WriteError
 from mesoslip.execution.stop import Stop, stopped_by_signals
 
 if TYPE_CHECKING:
-    from mesoslip.campaign.plan import Plan
-    from mesoslip.campaign.runner import Sweep
+    from mesoslip.campaign.sweep import Sweep
+    from mesoslip.campaign.sweep_plan import Plan
 
 # Maximum number of failures that are printed.
 MAX_REPORTED = 20
@@ -56,8 +56,8 @@ def sweep(
     Each finished point is stored beside the output, in NAME.points. Called again, the command
     computes the missing points. The exit status is 1 if points failed.
     """
-    from mesoslip.campaign.plan import Plan
-    from mesoslip.campaign.runner import run_sweep
+    from mesoslip.campaign.sweep import run_sweep
+    from mesoslip.campaign.sweep_plan import Plan
     from mesoslip.execution.store import Store
     from mesoslip.output import targets
 

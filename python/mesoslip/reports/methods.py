@@ -92,6 +92,18 @@ def branches_method(tree: xr.DataTree, config: Config) -> str:
     )
 
 
+def lyapunov_method(tree: xr.DataTree, config: Config) -> str:
+    """The method of a Lyapunov exponent."""
+    return " ".join(
+        (
+            *_engine(config),
+            f"The largest Lyapunov exponent is the rate at which {tree.sizes['twin']} twins depart "
+            "from the run: they start a small distance away, with the same random numbers.",
+            *model(config),
+        )
+    )
+
+
 def steady_method(_tree: xr.DataTree, config: Config) -> str:
     """The method of steady sliding over velocity."""
     return " ".join(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from importlib.metadata import version
+from importlib.resources import files
 from pathlib import Path
 
 from mesoslip.errors import FileError
@@ -31,10 +32,9 @@ def sections_of(subjects: Sequence[Subject]) -> list[Section]:
 
 def page(subjects: Sequence[Subject]) -> str:
     """The page about outputs of one command, side by side; see `sections_of`."""
-    from jinja2 import Environment, PackageLoader, StrictUndefined
+    from jinja2 import Environment, StrictUndefined
 
     environment = Environment(
-        loader=PackageLoader("mesoslip.reports", "."),
         autoescape=True,
         trim_blocks=True,
         lstrip_blocks=True,
@@ -47,7 +47,8 @@ def page(subjects: Sequence[Subject]) -> str:
     }
     sections = sections_of(subjects)
     titles = dict.fromkeys(one.tree.attrs.get("title", one.name) for one in subjects)
-    return environment.get_template("page.html").render(
+    template = files("mesoslip.reports").joinpath("page.html").read_text("utf-8")
+    return environment.from_string(template).render(
         title="; ".join(titles),
         names=[one.name for one in subjects],
         date=subjects[0].tree.attrs.get("date_created", ""),

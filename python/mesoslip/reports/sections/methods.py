@@ -15,6 +15,7 @@ from mesoslip.reports.methods import (
     curve_method,
     cycle_method,
     fit_method,
+    lyapunov_method,
     measured_method,
     onset_method,
     run_method,
@@ -35,6 +36,7 @@ METHODS: dict[str, Callable[[xr.DataTree, Config], str]] = {
     "curve": curve_method,
     "steady": steady_method,
     "onset": onset_method,
+    "lyapunov": lyapunov_method,
     "fit": fit_method,
 }
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from mesoslip.campaign.combination import Combination
-    from mesoslip.campaign.plan import Plan
+    from mesoslip.campaign.sweep_plan import Plan
 
 STATUS = ("ok", "failed", "missing")
 OK, FAILED, MISSING = range(3)
@@ -24,7 +24,7 @@ OK, FAILED, MISSING = range(3)
 MAX_FAILURES = 100
 
 
-class Assembly:
+class SweepDataset:
     """The dataset of a sweep, filled point by point."""
 
     def __init__(self, plan: Plan) -> None:
@@ -43,18 +43,15 @@ class Assembly:
             values[where] = measures[name]
 
     def fail(self, combination: Combination, realization: int) -> None:
-        """Mark a point as failed."""
+        """Mark a point that failed."""
         self._status[(*combination.index, realization)] = FAILED
 
     def dataset(self, ending: str, failures: Mapping[str, str]) -> xr.Dataset:
-        """The dataset as it is now.
+        """The dataset as it is now: ``status`` and the measures, NaN where points are missing.
 
-        Returns
-        -------
-        xarray.Dataset
-            A dimension for each swept key, named like it, with its values in SI; one for keys that
-            go together, named like the first of them; ``sample`` for a Latin hypercube; and
-            ``realization``. Variables: ``status`` and the measures, NaN where points are missing.
+        It has a dimension for each swept key, named like it, with its values in SI; one for keys
+        that go together, named like the first of them; ``sample`` for a Latin hypercube; and
+        ``realization``.
         """
         import xarray as xr
 
@@ -100,7 +97,7 @@ class Assembly:
         }
 
     def manifest(self, names: Sequence[str]) -> dict[str, Any]:
-        """The names of the points of the sweep; others in its folder are not needed."""
+        """The names of the points of the sweep, and what they are of, for the store."""
         plan = self._plan
         return {
             "program": program(),

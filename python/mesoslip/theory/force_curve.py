@@ -320,7 +320,7 @@ class ForceCurve:
     @cached_property
     def K_star_error(self) -> float:  # noqa: N802
         """Error of K* [N/m]: of the solution, and of samples of thresholds, two standard
-        deviations and half of the correction for the bandwidth."""
+        deviations and the correction for the bandwidth."""
         smoothed = self._smoothed
         error = smoothed.slope_error * self._force_unit / self.stretch_unit
         if self._sampled is None:
@@ -331,7 +331,7 @@ class ForceCurve:
         steepest = smoothed._steepest[0]
         # The maximum may be anywhere that the errors allow.
         above = float(np.nanmax(sampling - slope)) - steepest
-        return error + math.hypot(above, (self.K_star[0] - max(steepest, 0.0)) / 2)
+        return error + math.hypot(above, self.K_star[0] - max(steepest, 0.0))
 
     @cached_property
     def _steepest(self) -> tuple[float, float]:

@@ -1,7 +1,8 @@
 """The reference of the Fortran library, made from its ``!>`` comments.
 
-Fortran modules are read line by line, as the house writes them: a comment before what it tells of,
-``public ::`` lists, and a comment before each dummy argument.
+Modules are read line by line, as the house writes them: a comment before each entity, component and
+argument, and ``public ::`` lists. A bound procedure is documented where it is declared, at its
+interface or its own definition; an override is listed with a link to the type that declares it.
 """
 
 from __future__ import annotations
@@ -25,20 +26,16 @@ their last argument; unallocated means success. The library never stops the prog
 
 MODULE = re.compile(r"module (?!procedure)(\w+)")
 TYPE = re.compile(r"type(?:, *[\w() ,]+)? *:: *(\w+)|type +(\w+)$")
+PARENT = re.compile(r"extends\((\w+)\)")
+BINDING = re.compile(r"procedure(?:\((\w+)\))?(.*?)(?:::)? *([\w, =>]+)$")
 
 
 @dataclass
 class Entity:
-    """A type or procedure.
+    """A type, procedure or interface.
 
-    Attributes
-    ----------
-    kind
-        "type", "subroutine", "function", "interface".
-    head
-        Its first statement.
-    parts
-        Declarations of components or arguments, and what the comment before each says.
+    ``parts`` are declarations of components or arguments with the comment before each, ``bindings``
+    the public procedures of a type with theirs: names of binding and of procedure or interface.
     """
 
     kind: str
@@ -46,6 +43,7 @@ class Entity:
     head: str
     comment: str
     parts: list[tuple[str, str]] = field(default_factory=list)
+    bindings: list[tuple[str, str, str]] = field(default_factory=list)
 
 
 @dataclass
@@ -144,36 +142,50 @@ def _procedure(statement: str) -> tuple[str, str] | None:
 
 
 def _add_part(entity: Entity, statement: str, comment: str) -> None:
-    """A component, binding or argument, if a comment tells of it."""
-    is_binding = entity.kind == "type" and statement.startswith("procedure")
-    if not comment or not (is_binding or "::" in statement):
-        return
+    """Add a component, binding, argument or result to an entity."""
     declaration, _, names = statement.rpartition("::")
-    if is_binding:
-        names = re.sub(r" *=> *\w+", "", names if declaration else statement.split(None, 1)[1])
-        entity.parts.append((f"{names.strip()} (procedure)", comment))
+    declaration, names = declaration.strip(), names.strip()
+    is_type = entity.kind == "type"
+    if is_type and (binding := BINDING.match(statement)):
+        interface, attributes, bound = binding.groups()
+        if "private" not in attributes:
+            for one in bound.split(","):
+                name, _, target = (part.strip() for part in one.partition("=>"))
+                entity.bindings.append((name, interface or target or name, comment))
+    elif not declaration:
         return
-    if entity.kind != "type" and "intent" not in declaration and "procedure" not in declaration:
-        # What a function gives back, or a variable of its own.
+    elif is_type:
+        if comment and "private" not in declaration:
+            entity.parts.append((f"{names} : {declaration}", comment))
+    elif re.search(r"\b(intent|value|procedure)\b", declaration):
+        if names != "self":
+            entity.parts.append((f"{names} : {declaration}", comment))
+    else:
+        # The result of a function, or a local variable.
         result = re.search(r"result\((\w+)\)", entity.head)
-        if result is None or not names.strip().startswith(result[1]):
-            return
-    entity.parts.append((f"{names.strip()} : {declaration.strip()}", comment))
+        if comment and result and names.startswith(result[1]):
+            entity.parts.append((f"{names} : {declaration}", comment))
 
 
 def fortran_page() -> str:
-    """All modules with what they make public, room by room."""
+    """All modules with what they make public, folder by folder."""
     modules = [found for path in sorted(SOURCES.rglob("*.f90")) if (found := read_module(path))]
+    types = {
+        entity.name: (module, entity)
+        for module in modules
+        for entity in module.entities.values()
+        if entity.kind == "type"
+    }
     parts = [INTRODUCTION]
     modules.sort(key=lambda one: (str(Path(one.file).parent), one.file))
-    for room, inside in groupby(modules, key=lambda one: str(Path(one.file).parent)):
-        parts += [f"## {room}", ""]
+    for folder, inside in groupby(modules, key=lambda one: str(Path(one.file).parent)):
+        parts += [f"## {folder}", ""]
         for module in inside:
-            parts += _told(module)
+            parts += _section(module, types)
     return "\n".join(parts)
 
 
-def _told(module: Module) -> list[str]:
+def _section(module: Module, types: dict[str, tuple[Module, Entity]]) -> list[str]:
     parts = [f"### {module.name}", "", f"`{module.file}`. {_escaped(module.comment)}", ""]
     constants = [name for name in module.public if name in module.constants]
     if constants:
@@ -188,9 +200,41 @@ def _told(module: Module) -> list[str]:
             continue
         parts += [f"**{entity.name}**", "", "```fortran", _wrapped(entity.head), "```", ""]
         parts += [_escaped(entity.comment), ""]
-        parts += [f"- `{what}`<br>{_on_a_line(comment)}" for what, comment in entity.parts]
+        parts += [_item(what, comment) for what, comment in entity.parts]
+        for binding in entity.bindings:
+            parts += _bound(binding, module, declaring(entity, binding[0], types))
         parts.append("")
     return parts
+
+
+def declaring(
+    entity: Entity, name: str, types: dict[str, tuple[Module, Entity]]
+) -> tuple[Module, Entity] | None:
+    """The type that declares the procedure that a binding overrides, and its module."""
+    found = None
+    while parent := PARENT.search(entity.head):
+        module, entity = types[parent[1]]
+        if any(binding[0] == name for binding in entity.bindings):
+            found = module, entity
+    return found
+
+
+def _bound(
+    binding: tuple[str, str, str], module: Module, base: tuple[Module, Entity] | None
+) -> list[str]:
+    """A bound procedure: its comment and arguments, or a link to what it overrides."""
+    name, target, comment = binding
+    procedure = module.entities.get(target)
+    comment = comment or (procedure.comment if procedure else "")
+    if base is not None:
+        line = f"- `{name}` (procedure of [{base[1].name}](#{base[0].name}))"
+        return [f"{line}<br>{_on_a_line(comment)}" if comment else line]
+    parts = procedure.parts if procedure else []
+    return [_item(f"{name} (procedure)", comment), *("  " + _item(*part) for part in parts)]
+
+
+def _item(what: str, comment: str) -> str:
+    return f"- `{what}`" + (f"<br>{_on_a_line(comment)}" if comment else "")
 
 
 def _wrapped(head: str) -> str:

@@ -28,7 +28,6 @@ contains
 
    !> Set up a simulation without parts; the handle is zero if there is not enough memory.
    subroutine open_handle(handle)
-      !> The handle
       integer(i8), intent(out) :: handle(2)
 
       type(stamped_type), pointer :: stamped
@@ -58,11 +57,9 @@ contains
 
    !> The simulation of a handle.
    subroutine find_simulation(handle, whole, simulation, error)
-      !> The handle
       integer(i8), intent(in) :: handle(2)
       !> Whether it must have all its parts
       logical, intent(in) :: whole
-      !> The simulation
       type(simulation_type), pointer, intent(out) :: simulation
       !> Set if there is none, or a part is missing
       type(error_type), allocatable, intent(out) :: error

@@ -8,7 +8,6 @@ subroutine open_simulation(handle)
    !f2py threadsafe
    use mesoslip_boundary_handles, only: open_handle
    implicit none
-   !> The handle
    integer(8), intent(inout) :: handle(2)
 
    call open_handle(handle)

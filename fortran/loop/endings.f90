@@ -1,4 +1,4 @@
-!> Why a run is over, and what stops it before its drive ends.
+!> Reasons for the end of a run, and conditions that end it before its drive.
 module mesoslip_loop_endings
    use mesoslip_interface_law, only: window_type
    use mesoslip_numerics_kinds, only: i8, wp
@@ -12,9 +12,8 @@ module mesoslip_loop_endings
    public :: ending_none, ending_drive, ending_avalanches, ending_broken, ending_slides, &
       & ending_slips, ending_displacement, ending_steady, ending_names
 
-   !> Why a run is over: it is not; the drive came to its end; there were as many avalanches as
-   !> wanted; no contact is left to break; contacts break under a force without end; there were as
-   !> many slips as wanted; the slider came to its displacement; the state is steady
+   !> Reason for the end of a run: not ended; end of the drive; number of avalanches; all contacts
+   !> broken; contacts break under a force without end; number of slips; displacement; steady state
    integer, parameter :: ending_none = 0, ending_drive = 1, ending_avalanches = 2, &
       & ending_broken = 3, ending_slides = 4, ending_slips = 5, ending_displacement = 6, &
       & ending_steady = 7
@@ -29,33 +28,26 @@ module mesoslip_loop_endings
       !> Displacement of the slider [m]; 0 for none
       real(wp) :: displacement = 0.0_wp
    contains
-      !> Whether a slider has come to the displacement
       procedure, non_overridable :: is_reached
-      !> Let a window, or a schedule, end there
       procedure, non_overridable :: limit_window
       procedure, non_overridable :: limit_schedule
    end type stop_type
 
 contains
 
-   !> Whether a slider has come to the displacement.
+   !> Whether a slider has reached the displacement.
    pure function is_reached(self, slider)
-      !> Conditions that end the run
       class(stop_type), intent(in) :: self
-      !> The slider
       class(slider_type), intent(in) :: slider
-      !> Whether it has
       logical :: is_reached
 
       is_reached = abs(self%displacement) > 0.0_wp .and. sign(1.0_wp, self%displacement) &
          & * (slider%displacement - (self%displacement - slider%origin)) >= 0.0_wp
    end function is_reached
 
-   !> Let a window end at the displacement.
+   !> End a window at the displacement.
    pure subroutine limit_window(self, window, origin)
-      !> Conditions that end the run
       class(stop_type), intent(in) :: self
-      !> The window
       type(window_type), intent(inout) :: window
       !> Origin of its displacements [m]
       real(wp), intent(in) :: origin
@@ -67,11 +59,9 @@ contains
       end if
    end subroutine limit_window
 
-   !> Let a schedule end before the displacement.
+   !> End a schedule before the displacement.
    pure subroutine limit_schedule(self, schedule, origin)
-      !> Conditions that end the run
       class(stop_type), intent(in) :: self
-      !> The schedule
       type(schedule_type), intent(inout) :: schedule
       !> Origin of its displacements [m]
       real(wp), intent(in) :: origin

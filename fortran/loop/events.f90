@@ -14,7 +14,6 @@ contains
 
    !> One advance of the slider, and the events at its end.
    subroutine advance_to_event(state)
-      !> The state
       class(state_type), intent(inout) :: state
 
       type(pose_type) :: before
@@ -48,11 +47,9 @@ contains
       call change_drive(state)
    end subroutine advance_to_event
 
-   !> The slider advances, and the clocks of the contacts go on.
+   !> Advance the slider with the clocks of the contacts.
    subroutine advance_slider(state, law, window)
-      !> The state
       class(state_type), intent(inout) :: state
-      !> Contact force, and where it holds
       type(interface_law_type), intent(in) :: law
       type(window_type), intent(in) :: window
 
@@ -64,11 +61,10 @@ contains
       if (state%contacts%has_clocks) state%contacts%clock = state%slider%clock
    end subroutine advance_slider
 
-   !> Contacts respond to a motion: what breaks at one displacement is an avalanche.
+   !> Contacts respond to a motion; those that break at one displacement are an avalanche.
    subroutine respond(state, before, law)
-      !> The state
       class(state_type), intent(inout) :: state
-      !> Where the slider was, and the contact force until now
+      !> Pose before the motion, and the contact force until now
       type(pose_type), intent(in) :: before
       type(interface_law_type), intent(in) :: law
 

@@ -17,13 +17,11 @@ module mesoslip_loop_instant
 contains
 
    !> Some advances of the slider up to its equilibrium, and with the drive from there; or a part of
-   !> an avalanche that a segment ends in.
+   !> an avalanche in which a segment ends.
    subroutine advance_in_equilibrium(state, slider, segment)
-      !> The state
       class(state_type), intent(inout), target :: state
-      !> Its slider
+      !> The slider of the state
       class(instant_slider_type), intent(inout), target :: slider
-      !> The segment of the run
       type(segment_type), intent(in) :: segment
 
       type(pose_type) :: before
@@ -46,7 +44,7 @@ contains
       end if
       call state%avalanches%take_due_snapshots(slider, state%contacts)
       call end_at_avalanches(state)
-      ! It jumps past a displacement: the run ends where it comes to rest.
+      ! It jumps past a displacement: the run ends where it rests.
       if (slider%is_settled) call end_at_displacement(state)
       if (state%ending /= ending_none) return
 
@@ -57,12 +55,12 @@ contains
       call change_drive(state)
    end subroutine advance_in_equilibrium
 
-   !> Jump from contact to contact until there is an equilibrium, then go with the drive.
+   !> Jump from contact to contact until there is an equilibrium, then move with the drive.
    subroutine jump(state, slider, segment, before, law)
       class(state_type), intent(inout), target :: state
       class(instant_slider_type), intent(inout), target :: slider
       type(segment_type), intent(in) :: segment
-      !> Where the slider was before its last advance, and the contact force in it
+      !> Pose before the last advance, and the contact force in it
       type(pose_type), intent(out) :: before
       type(interface_law_type), intent(out) :: law
 
@@ -99,13 +97,13 @@ contains
       end do
    end subroutine jump
 
-   !> Breaks in an avalanche from which on contacts break without end.
+   !> Breaks in an avalanche beyond which contacts break without end.
    pure function max_size(state, slider) result(breaks)
       class(state_type), intent(in), target :: state
       class(instant_slider_type), intent(in), target :: slider
       real(wp) :: breaks
 
-      breaks = slider%max_breaks()
+      breaks = slider%max_breaks
       if (breaks < huge(1.0_wp)) breaks = breaks * state%contacts%parameters%count
    end function max_size
 

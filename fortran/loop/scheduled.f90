@@ -16,11 +16,10 @@ module mesoslip_loop_scheduled
 
 contains
 
-   !> Some advances of the slider through a schedule, or one if there is none.
+   !> Some advances of the slider through a schedule, or one without a schedule.
    subroutine advance_through_schedule(state, segment)
-      !> The state, its slider being one that runs through schedules
+      !> The state; its slider can run through schedules
       class(state_type), intent(inout) :: state
-      !> The segment of the run
       type(segment_type), intent(in) :: segment
 
       call plan(state)
@@ -66,8 +65,8 @@ contains
       end do
       call state%contacts%settle(state%schedule, state%slider%pose())
       call state%avalanches%count_others(state%schedule%moments, state%contacts%breaks)
-      ! The schedule was for the other direction: what is due at the turn is for contacts to say, as
-      ! is what breaks on the way back.
+      ! The schedule was for the other direction: the contacts decide what is due at the turn, and
+      ! what breaks on the way back.
       if (turns .or. state%schedule%at_bound) call respond(state, before, state%contacts%law())
       call end_at_slips(state)
       call end_at_displacement(state)

@@ -1,4 +1,4 @@
-!> The bounds of a segment of a run, between two looks at signals.
+!> The bounds of a segment of a run, between two checks for signals.
 !>
 !> One advance may break very many contacts, and between two events a slider may need very many
 !> steps: all work is bounded. The numbers of a run do not depend on where segments end.
@@ -9,24 +9,19 @@ module mesoslip_loop_segment
 
    public :: segment_type, new_segment
 
-   !> Number of advances that is as good as any
+   !> Number of advances that no segment reaches
    real(wp), parameter :: any_number = 1.0e18_wp
 
    !> A segment of a run.
    type :: segment_type
-      !> Breaks of contacts up to which it goes
+      !> Counts of breaks and of advances at which it ends
       real(wp) :: max_breaks = 0.0_wp
-      !> Advances up to which it goes
       integer(i8), private :: max_advances = 0
-      !> Work it may take and has taken, in units of an advance of a rigid slider or a contact that
-      !> breaks
+      !> Work at which it ends, and work so far: 1 for an advance of a rigid slider or a break
       real(wp), private :: max_work = 0.0_wp, work = 0.0_wp
    contains
-      !> Add the work of some advances
       procedure, non_overridable :: add
-      !> Whether it is over
       procedure, non_overridable :: is_over
-      !> The advance at which it ends at the latest
       procedure, non_overridable :: last_advance
    end type segment_type
 
@@ -40,7 +35,6 @@ contains
       !> Advances and work in the segment
       integer(i8), intent(in) :: max_advances
       real(wp), intent(in) :: max_work
-      !> The segment
       type(segment_type) :: self
 
       self%max_advances = advances + max_advances
@@ -50,9 +44,8 @@ contains
 
    !> Add the work of some advances.
    subroutine add(self, advances, cost)
-      !> The segment
       class(segment_type), intent(inout) :: self
-      !> Their number; none is work too
+      !> Their number; 0 counts as 1
       integer(i8), intent(in) :: advances
       !> Work of one
       real(wp), intent(in) :: cost
@@ -62,27 +55,22 @@ contains
 
    !> Whether the segment is over.
    pure function is_over(self, advances, breaks)
-      !> The segment
       class(segment_type), intent(in) :: self
       !> Advances and breaks so far
       integer(i8), intent(in) :: advances
       real(wp), intent(in) :: breaks
-      !> Whether it is
       logical :: is_over
 
       is_over = advances >= self%max_advances .or. self%work >= self%max_work &
          & .or. breaks > self%max_breaks
    end function is_over
 
-   !> The advance at which the segment ends at the latest.
+   !> Number of the last advance of the segment, one more than so far at least.
    pure function last_advance(self, advances, cost) result(last)
-      !> The segment
       class(segment_type), intent(in) :: self
-      !> Advances so far
+      !> Advances so far, and work of one
       integer(i8), intent(in) :: advances
-      !> Work of an advance
       real(wp), intent(in) :: cost
-      !> Number of the advance, one more than so far at least
       integer(i8) :: last
 
       real(wp) :: number

@@ -17,9 +17,9 @@ module mesoslip_loop_simulation
 
    public :: simulation_type
 
-   !> Advances in a row that leave both time and displacement as they were.
+   !> Maximum number of advances in a row that change neither time nor displacement
    integer, parameter :: max_idle_advances = 1000000
-   !> Part of the time until the end of a part of the drive that is as good as none for them all
+   !> Share of the time of a part of the drive that is no progress for all of them together
    real(wp), parameter :: tiny_part = 1.0e-20_wp
    !> Time at which nothing happens
    real(wp), parameter :: never = huge(1.0_wp)
@@ -27,20 +27,16 @@ module mesoslip_loop_simulation
    !> A run.
    type, extends(state_type) :: simulation_type
    contains
-      !> Prepare the start
       procedure, non_overridable :: start
-      !> Go on from the end of another run
       procedure, non_overridable :: follow
-      !> Go on for a segment, or until the end
       procedure, non_overridable :: run
-      procedure, non_overridable, private :: advance, check_progress, is_full
+      procedure, non_overridable, private :: advance, check_progress
    end type simulation_type
 
 contains
 
    !> Prepare the start of a run: contacts drawn, slider at rest and in balance.
    subroutine start(self, initial)
-      !> The simulation
       class(simulation_type), intent(inout) :: self
       !> Initial state of the contacts, an initial_ code of the ensemble
       integer, intent(in) :: initial
@@ -70,10 +66,9 @@ contains
       call self%avalanches%take_due_snapshots(self%slider, self%contacts)
    end subroutine start
 
-   !> Go on from the end of another run, whose state was restored: the first part of the drive is
-   !> over, and the second begins. Time, displacement and counts go on.
+   !> Continue from the end of another run, whose state was restored: the first part of the drive is
+   !> over, and the second begins. Time, displacement and counts continue.
    subroutine follow(self, error)
-      !> The simulation
       class(simulation_type), intent(inout) :: self
       !> Set if no run can follow
       type(error_type), allocatable, intent(out) :: error
@@ -97,13 +92,12 @@ contains
       call self%avalanches%take_due_snapshots(self%slider, self%contacts)
    end subroutine follow
 
-   !> Go on for some advances or some work, or until much waits to be taken away, or until the end.
+   !> Continue until the end of the run or of a segment, or until a buffer should be drained.
    subroutine run(self, max_advances, max_work, error)
-      !> The simulation
       class(simulation_type), intent(inout) :: self
-      !> Number of advances of the slider
+      !> Advances of the slider, and work, in the segment: 1 for an advance of a rigid slider or a
+      !> break
       integer(i8), intent(in) :: max_advances
-      !> Work, in units of an advance of a rigid slider or a contact that breaks
       real(wp), intent(in) :: max_work
       !> Set if the motion makes no progress, or there is not enough memory
       type(error_type), allocatable, intent(out) :: error
@@ -114,7 +108,9 @@ contains
       segment = new_segment(self%advances, self%contacts%breaks, max_advances, max_work)
       do while (self%ending == ending_none)
          if (self%slider%can_pause()) then
-            if (segment%is_over(self%advances, self%contacts%breaks) .or. self%is_full()) exit
+            if (segment%is_over(self%advances, self%contacts%breaks)) exit
+            if (self%recorder%is_full()) exit
+            if (self%avalanches%is_full() .or. self%stages%is_full()) exit
          end if
          advances = self%advances
          call self%advance(segment)
@@ -149,20 +145,13 @@ contains
       end select
    end subroutine advance
 
-   !> Whether so much waits that it should be taken away.
-   pure function is_full(self)
-      class(simulation_type), intent(in) :: self
-      logical :: is_full
-
-      is_full = self%recorder%is_full() .or. self%avalanches%is_full() .or. self%stages%is_full()
-   end function is_full
-
-   !> Whether advances change anything. Steps that become shorter without end do not either.
+   !> Make sure that advances change time or displacement. Steps that become shorter without end do
+   !> not.
    subroutine check_progress(self, advances, error)
       class(simulation_type), intent(inout) :: self
-      !> Number of the last ones
+      !> Number of the last advances
       integer(i8), intent(in) :: advances
-      !> Set if very many have not
+      !> Set if very many have changed neither
       type(error_type), allocatable, intent(out) :: error
 
       real(wp) :: no_time, no_distance
@@ -173,7 +162,7 @@ contains
             no_time = max(no_time, tiny_part * slider%drive%end_of_part())
          end if
          no_distance = epsilon(1.0_wp) * contacts%static_force / contacts%stiffness
-         ! The origin moves by what has no rounding error: that is no progress.
+         ! The origin moves without rounding error: that is no progress.
          if (slider%time - self%idle_since(1) > no_time .or. abs((slider%origin &
             & - self%idle_since(2)) + (slider%displacement - self%idle_since(3))) &
             & > no_distance) then

@@ -1,4 +1,4 @@
-!> The state of a run: a slider on contacts, how far it has come, and what is recorded of it.
+!> The state of a run: a slider on contacts, with recorders.
 module mesoslip_loop_state
    use mesoslip_contacts_base, only: contacts_type
    use mesoslip_loop_endings, only: ending_none, stop_type
@@ -27,13 +27,10 @@ module mesoslip_loop_state
       & "break_loss", "birth_gain", "step_work", "residual"]
    integer, parameter :: energy_length = size(energy_columns)
 
-   !> A slider, which has its drive, on contacts, and what is recorded of it.
+   !> A slider with its drive, on contacts, and recorders.
    type :: state_type
-      !> The slider
       class(slider_type), allocatable :: slider
-      !> The contacts
       class(contacts_type), allocatable :: contacts
-      !> The recorder
       type(recorder_type) :: recorder
       !> The recorder of avalanches and snapshots
       type(avalanche_recorder_type) :: avalanches
@@ -45,9 +42,8 @@ module mesoslip_loop_state
       type(stop_type) :: stop
       !> Advances of the slider so far
       integer(i8) :: advances = 0
-      !> Why the run is over, an ending_ code
+      !> Reason for the end of the run, an ending_ code
       integer :: ending = ending_none
-      !> Whether the run has been started
       logical :: is_started = .false.
       !> Maximum number of breaks, and of attachments, in a schedule; 0 for no schedules. The
       !> numbers of a run do not depend on it
@@ -60,22 +56,16 @@ module mesoslip_loop_state
       !> Energy of slider and contacts at the start [J]
       real(wp) :: start_energy = 0.0_wp
 
-      !> A state that was put away and has not been fetched
+      !> A state that was saved and has not been fetched
       type(archive_type), private :: kept
    contains
-      !> Whether all parts are there
       procedure, non_overridable :: is_whole
-      !> Terms of the energy balance
       procedure, non_overridable :: energy_balance
-      !> A table of what was recorded, rows of it that can be taken away, and taking them away
       procedure, non_overridable :: table
       procedure, non_overridable :: rows_to_drain
       procedure, non_overridable :: drain
-      !> Displace the drive at once
       procedure, non_overridable :: displace_drive
-      !> Put the state into an archive or take it out
       procedure, non_overridable :: exchange
-      !> Put the state away, fetch it, and go on from it
       procedure, non_overridable :: save
       procedure, non_overridable :: fetch
       procedure, non_overridable :: restore
@@ -85,9 +75,7 @@ contains
 
    !> Whether all parts are there: a slider with its drive, contacts, and recorders.
    pure function is_whole(self)
-      !> The state
       class(state_type), intent(in) :: self
-      !> Whether they are
       logical :: is_whole
 
       is_whole = allocated(self%slider) .and. allocated(self%contacts) &
@@ -97,11 +85,9 @@ contains
       if (is_whole) is_whole = self%slider%drive%is_open() .and. self%steady%is_open()
    end function is_whole
 
-   !> Terms of the energy balance, and how far it is from closing.
+   !> Terms of the energy balance, in the order of energy_columns [J].
    function energy_balance(self) result(energy)
-      !> The state
       class(state_type), intent(in) :: self
-      !> Terms in the order of energy_length [J]
       real(wp) :: energy(energy_length)
 
       energy(1) = self%slider%drive%work()
@@ -116,13 +102,10 @@ contains
          & - energy(4) - energy(5) - energy(6) + energy(7) - energy(8)
    end function energy_balance
 
-   !> A table of what was recorded.
+   !> A table of recorded rows; null if there is no table of this name.
    function table(self, name) result(buffer)
-      !> The state
       class(state_type), intent(inout), target :: self
-      !> Its name
       character(len=*), intent(in) :: name
-      !> The table; null if there is none of this name
       type(buffer_type), pointer :: buffer
 
       select case (name)
@@ -147,13 +130,10 @@ contains
       end select
    end function table
 
-   !> Rows of a table that can be taken away.
+   !> Number of rows of a table that can be drained.
    function rows_to_drain(self, name) result(rows)
-      !> The state
       class(state_type), intent(inout), target :: self
-      !> Name of the table
       character(len=*), intent(in) :: name
-      !> Their number
       integer :: rows
 
       type(buffer_type), pointer :: buffer
@@ -164,15 +144,13 @@ contains
       if (name == "slip_trace") rows = self%recorder%slips%final_samples()
    end function rows_to_drain
 
-   !> Take the first rows of a table away.
+   !> Remove the first rows of a table and return them.
    subroutine drain(self, name, values, error)
-      !> The state
       class(state_type), intent(inout), target :: self
-      !> Name of the table
       character(len=*), intent(in) :: name
       !> The rows, shape (numbers in a row, rows)
       real(wp), intent(inout) :: values(:, :)
-      !> Set if there is no such table, or it has not as many rows, or others
+      !> Set if there is no such table, or it has fewer or other rows
       type(error_type), allocatable, intent(out) :: error
 
       type(buffer_type), pointer :: buffer
@@ -191,26 +169,23 @@ contains
       end if
    end subroutine drain
 
-   !> Displace the drive at once: the spring has another length, and the motion goes on from there.
+   !> Displace the drive at once: the motion continues with another length of the spring.
    subroutine displace_drive(self, distance)
-      !> The state, between two segments
       class(state_type), intent(inout) :: self
-      !> How far [m]
+      !> Displacement [m]
       real(wp), intent(in) :: distance
 
       real(wp) :: energy
 
       energy = self%slider%energy()
       self%slider%drive%value = self%slider%drive%value + distance
-      ! The balance counts from the displaced state.
+      ! The energy balance starts from the displaced state.
       self%start_energy = self%start_energy + (self%slider%energy() - energy)
    end subroutine displace_drive
 
    !> Put the state into an archive or take it out; a queue taken out is rebuilt.
    subroutine exchange(self, archive)
-      !> The state
       class(state_type), intent(inout) :: self
-      !> The archive
       type(archive_type), intent(inout) :: archive
 
       call archive%section("simulation")
@@ -233,13 +208,12 @@ contains
       call self%contacts%rebuild(self%slider%displacement)
    end subroutine exchange
 
-   !> Put the state away.
+   !> Save the state, to be fetched.
    subroutine save(self, length, error)
-      !> The state
       class(state_type), intent(inout) :: self
-      !> Words of the state
+      !> Length of the state in words
       integer(i8), intent(out) :: length
-      !> Set if the run cannot be taken up from here
+      !> Set if the state cannot be saved
       type(error_type), allocatable, intent(out) :: error
 
       self%kept = archive_type(saving=.true.)
@@ -248,13 +222,11 @@ contains
       if (allocated(self%kept%failure)) error = self%kept%failure
    end subroutine save
 
-   !> Fetch the state that was put away; it is forgotten.
+   !> Fetch the state that was saved; the copy here is deleted.
    subroutine fetch(self, words, error)
-      !> The state
       class(state_type), intent(inout) :: self
-      !> The state, as many words as it has
       integer(i8), intent(inout) :: words(:)
-      !> Set if there is none, or one of another length
+      !> Set if no state of this length was saved
       type(error_type), allocatable, intent(out) :: error
 
       if (size(words, kind=i8) == self%kept%length .and. self%kept%length > 0) then
@@ -265,11 +237,9 @@ contains
       end if
    end subroutine fetch
 
-   !> Go on from a state that was put away.
+   !> Continue from a state that was saved.
    subroutine restore(self, words, error)
-      !> The state
       class(state_type), intent(inout) :: self
-      !> The state
       integer(i8), intent(in) :: words(:)
       !> Set if the state is of another simulation, or damaged
       type(error_type), allocatable, intent(out) :: error

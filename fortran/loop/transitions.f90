@@ -14,16 +14,15 @@ module mesoslip_loop_transitions
 
    !> Time at which nothing happens
    real(wp), parameter :: never = huge(1.0_wp)
-   !> The origin of displacements moves when the slider is this many breaking stretches ahead.
+   !> The origin of displacements moves when the slider is this many breaking stretches ahead
    real(wp), parameter :: shift_stretches = 64.0_wp
-   !> A velocity of the drive that differs by this part is another one.
+   !> Relative difference from which velocities of the drive are different
    real(wp), parameter :: tiny_part = 1.0e-9_wp
 
 contains
 
-   !> The run is over.
+   !> End the run.
    subroutine finish(state, ending)
-      !> The state
       class(state_type), intent(inout) :: state
       !> An ending_ code
       integer, intent(in) :: ending
@@ -37,23 +36,20 @@ contains
       state%ending = ending
    end subroutine finish
 
-   !> Whether no contact is left to break, in a run that would go on until one does.
+   !> Whether all contacts are broken, in a run that would continue until one breaks.
    pure function is_broken(state, law, window)
-      !> The state
       class(state_type), intent(in) :: state
       !> The law that the contacts offer
       type(interface_law_type), intent(in) :: law
       type(window_type), intent(in) :: window
-      !> Whether none is
       logical :: is_broken
 
       is_broken = .not. (abs(law%stiffness) > 0.0_wp .or. window%end_time < never &
          & .or. state%slider%drive%end_of_part() < never .or. state%avalanches%size > 0.0_wp)
    end function is_broken
 
-   !> End the run if there were as many avalanches as wanted.
+   !> End the run at the requested number of avalanches.
    subroutine end_at_avalanches(state)
-      !> The state
       class(state_type), intent(inout) :: state
 
       if (state%avalanches%avalanches >= state%avalanches%parameters%max_avalanches) then
@@ -61,17 +57,15 @@ contains
       end if
    end subroutine end_at_avalanches
 
-   !> End the run if there were as many slips as wanted.
+   !> End the run at the requested number of slips.
    subroutine end_at_slips(state)
-      !> The state
       class(state_type), intent(inout) :: state
 
       if (state%recorder%slips%count >= state%stop%max_slips) call finish(state, ending_slips)
    end subroutine end_at_slips
 
-   !> End the run if the slider came to its displacement.
+   !> End the run if the slider has reached the requested displacement.
    subroutine end_at_displacement(state)
-      !> The state
       class(state_type), intent(inout) :: state
 
       if (state%ending /= ending_none) return
@@ -80,7 +74,6 @@ contains
 
    !> End the run if a block of the drive is over and the state is steady.
    subroutine end_if_steady(state)
-      !> The state
       class(state_type), intent(inout) :: state
 
       logical :: is_steady
@@ -92,7 +85,6 @@ contains
 
    !> In the last part of the drive, at a constant velocity, look for a steady state.
    subroutine look_for_steady(state)
-      !> The state
       class(state_type), intent(inout) :: state
 
       associate (drive => state%slider%drive)
@@ -101,9 +93,8 @@ contains
       end associate
    end subroutine look_for_steady
 
-   !> Go over to the next part of the drive, or to the end; move the origin along.
+   !> Begin the next part of the drive, or end the run; move the origin along.
    subroutine change_drive(state)
-      !> The state
       class(state_type), intent(inout) :: state
 
       if (state%ending /= ending_none) return
@@ -126,10 +117,8 @@ contains
       call shift_origin(state)
    end subroutine change_drive
 
-   !> Go over to the next part of the drive, which may be of another stage, the last one being
-   !> recorded.
+   !> Begin the next part of the drive, perhaps of another stage.
    subroutine take_next_part(state)
-      !> The state
       class(state_type), intent(inout) :: state
 
       real(wp) :: rate, direction
@@ -156,7 +145,6 @@ contains
 
    !> Move the origin of displacements along with the slider.
    subroutine shift_origin(state)
-      !> The state
       class(state_type), intent(inout) :: state
 
       real(wp) :: grid, shift

@@ -17,9 +17,7 @@ module mesoslip_numerics_accumulator
       !> Sum of their rounding errors
       real(wp) :: low = 0.0_wp
    contains
-      !> Add one term
       procedure, non_overridable :: add
-      !> The total
       procedure, non_overridable :: total
    end type accumulator_type
 
@@ -27,9 +25,7 @@ contains
 
    !> Add one term to the total.
    elemental subroutine add(self, term)
-      !> The running total
       class(accumulator_type), intent(inout) :: self
-      !> Term to add
       real(wp), intent(in) :: term
 
       real(wp) :: sum, shadow
@@ -42,9 +38,7 @@ contains
 
    !> The total, rounded to a double.
    elemental function total(self)
-      !> The running total
       class(accumulator_type), intent(in) :: self
-      !> Sum of all terms
       real(wp) :: total
 
       total = self%high + self%low

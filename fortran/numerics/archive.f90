@@ -1,8 +1,8 @@
 !> The state of a run for a checkpoint: each object registers its own, by name.
 !>
 !> One procedure of an object both puts its state into an archive and takes it out, so that the two
-!> cannot differ. Every entry has a name and a shape, which are checked when it is taken out: a
-!> state of another kind, or of another version of the program, is an error and not a wrong result.
+!> cannot differ. Each entry has a name and a shape, which are checked when it is taken out: a state
+!> of another kind, or of another version of the program, is an error and not a wrong result.
 module mesoslip_numerics_archive
    use mesoslip_numerics_accumulator, only: accumulator_type
    use mesoslip_numerics_errors, only: error_type, raise, status_invalid, status_memory
@@ -23,35 +23,32 @@ module mesoslip_numerics_archive
 
    !> A state as words of 64 bits, with a place where the next entry goes.
    type :: archive_type
-      !> The words, as many as are in use or more
+      !> The words; those beyond length are not in use
       integer(i8), allocatable :: word(:)
-      !> Number of words in use
       integer(i8) :: length = 0
       !> Whether values are put into the archive, rather than taken from it
       logical :: saving = .false.
-      !> Set when what is to be taken out is not there
+      !> Set when an entry is not there, or there is not enough memory
       type(error_type), allocatable :: failure
       integer(i8), private :: place = 0
    contains
-      !> Begin the entries of an object
       procedure, non_overridable :: section
-      !> Put one value into the archive, or take it out
+      !> Put a value into the archive, or take it out; an array takes the shape that it has there
       generic :: exchange => exchange_real, exchange_integer, exchange_long, exchange_logical, &
-         & exchange_accumulator, exchange_reals, exchange_matrix, exchange_cube, &
-         & exchange_integers, exchange_integer_matrix
-      !> Make sure that all has been taken out
+         & exchange_accumulator, exchange_reals, exchange_matrix, exchange_integers, &
+         & exchange_integer_matrix
+      procedure, non_overridable :: exchange_fixed
       procedure, non_overridable :: finish
       procedure, non_overridable, private :: exchange_real, exchange_integer, exchange_long, &
-         & exchange_logical, exchange_accumulator, exchange_reals, exchange_matrix, exchange_cube
-      procedure, non_overridable, private :: exchange_integers, exchange_integer_matrix
+         & exchange_logical, exchange_accumulator, exchange_reals, exchange_matrix, &
+         & exchange_integers, exchange_integer_matrix
       procedure, non_overridable, private :: heading, exchange_words, reserve
    end type archive_type
 
 contains
 
-   !> Begin the entries of an object: whoever takes them out must be of the same kind.
+   !> Begin the entries of an object; only one of the same kind can take them out.
    subroutine section(self, name)
-      !> The archive
       class(archive_type), intent(inout) :: self
       !> Kind of the object
       character(len=*), intent(in) :: name
@@ -64,7 +61,6 @@ contains
 
    !> Make sure that all has been taken out.
    subroutine finish(self)
-      !> The archive
       class(archive_type), intent(inout) :: self
 
       if (allocated(self%failure) .or. self%saving) return
@@ -77,7 +73,7 @@ contains
       class(archive_type), intent(inout) :: self
       character(len=*), intent(in) :: name
       integer(i8), intent(in) :: kind
-      !> Shape of the entry, as it is when saving, as it was then when not
+      !> Shape of the entry; that in the archive on return
       integer, intent(inout) :: extent(2)
 
       character(len=name_length) :: padded, found
@@ -109,7 +105,6 @@ contains
       end if
    end subroutine heading
 
-   !> Put words in, or take them out.
    subroutine exchange_words(self, words)
       class(archive_type), intent(inout) :: self
       integer(i8), intent(inout) :: words(:)
@@ -131,7 +126,7 @@ contains
       self%place = self%place + length
    end subroutine exchange_words
 
-   !> Put the numbers of an array in, or take them out, of any shape.
+   !> Exchange the numbers of an array of any shape.
    subroutine exchange_flat(self, length, value)
       type(archive_type), intent(inout) :: self
       integer(i8), intent(in) :: length
@@ -170,7 +165,6 @@ contains
       call move_alloc(longer, self%word)
    end subroutine reserve
 
-   !> Note that there is not enough memory.
    subroutine lack_memory(self)
       class(archive_type), intent(inout) :: self
 
@@ -240,7 +234,6 @@ contains
       call self%exchange_real(name, value%low)
    end subroutine exchange_accumulator
 
-   !> Arrays take the shape that they have in the archive.
    subroutine exchange_reals(self, name, value)
       class(archive_type), intent(inout) :: self
       character(len=*), intent(in) :: name
@@ -287,15 +280,16 @@ contains
       call exchange_flat(self, size(value, kind=i8), value)
    end subroutine exchange_matrix
 
-   !> An array of three dimensions keeps its bounds: it must have its shape before.
-   subroutine exchange_cube(self, name, value)
+   !> Exchange an array of any rank that keeps its shape and bounds.
+   subroutine exchange_fixed(self, name, extent, value)
       class(archive_type), intent(inout) :: self
       character(len=*), intent(in) :: name
-      real(wp), intent(inout), contiguous :: value(:, :, :)
+      !> Shape of the array, as a matrix
+      integer, intent(in) :: extent(2)
+      real(wp), intent(inout) :: value(product(extent))
 
-      integer :: extent(2), found(2)
+      integer :: found(2)
 
-      extent = [size(value, 1) * size(value, 2), size(value, 3)]
       found = extent
       call self%heading(name, kind_real, found)
       if (allocated(self%failure)) return
@@ -305,7 +299,7 @@ contains
          return
       end if
       call exchange_flat(self, size(value, kind=i8), value)
-   end subroutine exchange_cube
+   end subroutine exchange_fixed
 
    subroutine exchange_integers(self, name, value)
       class(archive_type), intent(inout) :: self
@@ -360,7 +354,7 @@ contains
       call exchange_flat_integers(self, size(value, kind=i8), value)
    end subroutine exchange_integer_matrix
 
-   !> Put the integers of an array in, or take them out, of any shape.
+   !> Exchange the integers of an array of any shape.
    subroutine exchange_flat_integers(self, length, value)
       type(archive_type), intent(inout) :: self
       integer(i8), intent(in) :: length

@@ -6,22 +6,22 @@ module mesoslip_numerics_errors
    public :: error_type, raise
    public :: status_ok, status_invalid, status_memory, status_stalled, status_failed
 
-   !> Nothing went wrong.
+   !> Success
    integer, parameter :: status_ok = 0
-   !> An argument is outside its domain.
+   !> An argument is outside its domain
    integer, parameter :: status_invalid = 1
-   !> An array could not be allocated.
+   !> An array could not be allocated
    integer, parameter :: status_memory = 2
-   !> The motion makes no progress in time.
+   !> The motion makes no progress in time
    integer, parameter :: status_stalled = 3
-   !> An integrator gave up.
+   !> An integrator failed
    integer, parameter :: status_failed = 4
 
    !> Kind of a failure, and a sentence about it for the user.
    type :: error_type
       !> One of the status codes of this module
       integer :: status = status_ok
-      !> One sentence: what is wrong and what would be right
+      !> One sentence: the fault, and the remedy
       character(len=:), allocatable :: message
    end type error_type
 
@@ -29,11 +29,9 @@ contains
 
    !> Report an error to the caller.
    pure subroutine raise(error, status, message)
-      !> The error to report
       type(error_type), allocatable, intent(out) :: error
       !> One of the status codes of this module
       integer, intent(in) :: status
-      !> The fault, and what would be right
       character(len=*), intent(in) :: message
 
       allocate (error)

@@ -1,6 +1,6 @@
 !> Large pages of memory for long arrays.
 !>
-!> Contacts break in an order that has nothing to do with their numbers. Of a million of them the
+!> Contacts break in an order that has nothing to do with their numbers. With a million of them the
 !> processor has to look up the address of nearly each one that it reads, unless pages are large.
 module mesoslip_numerics_memory
    use, intrinsic :: iso_c_binding, only: c_double, c_loc, c_ptr, c_size_t
@@ -14,9 +14,8 @@ module mesoslip_numerics_memory
       subroutine request_pages(array, length) bind(c, name="mesoslip_request_large_pages")
          import :: c_ptr, c_size_t
          implicit none
-         !> Address of the array
          type(c_ptr), value :: array
-         !> Its length [bytes]
+         !> In bytes
          integer(c_size_t), value :: length
       end subroutine request_pages
    end interface
@@ -26,9 +25,7 @@ contains
    !> Ask for large pages of memory for an array, before anything is written to it (Linux, where the
    !> system may refuse; nothing is done elsewhere).
    subroutine request_large_pages(array, length)
-      !> Length of the array
       integer, intent(in) :: length
-      !> The array
       real(c_double), intent(inout), target :: array(length)
 
       if (length < 1) return

@@ -1,8 +1,8 @@
-!> Named parameters, numbers or words, that a kind of slider or of contacts is made from.
+!> Named parameters, numbers or words, from which kinds of sliders and contacts are made.
 !>
-!> Whoever is made takes what it needs by name. A name that is missing, or that nobody has taken, is
-!> an error: so a misspelt or superfluous parameter is found at once. A list of numbers is a name
-!> that occurs several times.
+!> Each kind takes its parameters by name. A missing name is an error, and so is one that is not
+!> taken: a misspelt or superfluous parameter is found at once. A list of numbers is a name that
+!> occurs several times.
 module mesoslip_numerics_parameters
    use mesoslip_numerics_errors, only: error_type, raise, status_invalid
    use mesoslip_numerics_kinds, only: wp
@@ -26,11 +26,8 @@ module mesoslip_numerics_parameters
    contains
       !> Take the parameter of a name: a number, a word, or a word that is one of some choices
       generic :: take => take_real, take_integer, take_logical, take_word, take_choice, take_list
-      !> Whether there is a parameter of a name
       procedure, non_overridable :: has
-      !> Add a word
       procedure, non_overridable :: add_word
-      !> Make sure that each parameter was taken
       procedure, non_overridable :: finish
       procedure, non_overridable, private :: take_real, take_integer, take_logical, take_word, &
          & take_choice, take_list, find
@@ -40,13 +37,11 @@ contains
 
    !> Set up a table.
    pure subroutine new_parameters(self, name, value, word)
-      !> The table
       type(parameters_type), intent(out) :: self
-      !> Names, shape (parameters)
+      !> Names and values, shape (parameters)
       character(len=*), intent(in) :: name(:)
-      !> Their values, shape (parameters)
       real(wp), intent(in) :: value(:)
-      !> Words that stand for numbers, shape (parameters); blank for a number, by default all
+      !> Words, shape (parameters); blank for a number, by default all
       character(len=*), intent(in), optional :: word(:)
 
       self%name = name
@@ -59,11 +54,8 @@ contains
 
    !> Whether there is a parameter of a name.
    pure function has(self, name)
-      !> The table
       class(parameters_type), intent(in) :: self
-      !> The name
       character(len=*), intent(in) :: name
-      !> Whether it is there
       logical :: has
 
       has = any(self%name == name)
@@ -71,9 +63,7 @@ contains
 
    !> Add a word.
    pure subroutine add_word(self, name, word)
-      !> The table
       class(parameters_type), intent(inout) :: self
-      !> Its name, and the word
       character(len=*), intent(in) :: name, word
 
       self%name = [character(len=name_length) :: self%name, name]
@@ -82,7 +72,7 @@ contains
       self%is_taken = [self%is_taken, .false.]
    end subroutine add_word
 
-   !> The place of a name in the table, which is taken; 0 if there is none.
+   !> The place of a name in the table, which is marked as taken; 0 if it is missing.
    subroutine find(self, name, place, error)
       class(parameters_type), intent(inout) :: self
       character(len=*), intent(in) :: name
@@ -197,9 +187,8 @@ contains
 
    !> Make sure that each parameter was taken.
    subroutine finish(self, error)
-      !> The table
       class(parameters_type), intent(in) :: self
-      !> Set if nobody has asked for one of its names
+      !> Set if one was not
       type(error_type), allocatable, intent(inout) :: error
 
       integer :: place
@@ -218,9 +207,8 @@ contains
    subroutine choose(name, word, choices, position, error)
       !> Name of the choice, for the error
       character(len=*), intent(in) :: name
-      !> The word, and what it can be
       character(len=*), intent(in) :: word, choices(:)
-      !> Its position, from 1; 0 if it is not one of them
+      !> Position from 1; 0 if the word is not one of them
       integer, intent(out) :: position
       !> Set if it is not one of them
       type(error_type), allocatable, intent(inout) :: error

@@ -2,7 +2,7 @@
 !>
 !> Philox 4x32-10 of J. K. Salmon, M. A. Moraes, R. O. Dror, D. E. Shaw, "Parallel random numbers:
 !> as easy as 1, 2, 3", SC'11. A draw of mesoslip is keyed by (seed, realization, contact, renewal),
-!> so it does not depend on what was drawn before it, or where.
+!> so it does not depend on other draws.
 module mesoslip_numerics_random
    use mesoslip_numerics_kinds, only: i8, wp
    implicit none

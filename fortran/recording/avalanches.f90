@@ -66,24 +66,15 @@ module mesoslip_recording_avalanches
       !> Time, displacement and contact force at the start of the present avalanche
       real(wp), private :: time = 0.0_wp, displacement = 0.0_wp, force = 0.0_wp
    contains
-      !> Make room for what will be recorded
       procedure, non_overridable :: open
-      !> Whether so much waits that it should be taken away
       procedure, non_overridable :: is_full
-      !> Take the snapshots that are due after an advance of the slider
       procedure, non_overridable :: take_due_snapshots
-      !> Count the breaks of a response of the contacts
       procedure, non_overridable :: count_breaks
-      !> Whether each avalanche is needed, and the number of others
       procedure, non_overridable :: needs_each
       procedure, non_overridable :: count_others
-      !> Close the present avalanche, if there is one
       procedure, non_overridable :: close
-      !> Begin another run
       procedure, non_overridable :: begin_run
-      !> Report that not all could be recorded
       procedure, non_overridable :: report_failure
-      !> Put the state into an archive or take it out
       procedure, non_overridable :: exchange
       procedure, non_overridable, private :: begin, take_snapshot
    end type avalanche_recorder_type
@@ -92,7 +83,6 @@ contains
 
    !> Make room for what will be recorded.
    subroutine open(self, parameters, snapshot_time, contacts)
-      !> The recorder
       class(avalanche_recorder_type), intent(inout) :: self
 !> Settings of the record
       type(avalanche_parameters_type), intent(in) :: parameters
@@ -118,7 +108,6 @@ contains
 
    !> Whether so much waits that it should be taken away.
    pure function is_full(self)
-      !> The recorder
       class(avalanche_recorder_type), intent(in) :: self
       !> Whether it does
       logical :: is_full
@@ -129,7 +118,6 @@ contains
 
    !> Take the snapshots that are due after an advance of the slider, before the contacts respond.
    subroutine take_due_snapshots(self, slider, contacts)
-      !> The recorder
       class(avalanche_recorder_type), intent(inout) :: self
       !> The slider after its advance
       class(slider_type), intent(in) :: slider
@@ -149,9 +137,7 @@ contains
 
    !> Count the breaks of a response of the contacts; an avalanche begins unless there is one.
    subroutine count_breaks(self, slider, contacts, law)
-      !> The recorder
       class(avalanche_recorder_type), intent(inout) :: self
-      !> The slider
       class(slider_type), intent(in) :: slider
       !> The contacts after their response
       class(contacts_type), intent(in) :: contacts
@@ -166,7 +152,6 @@ contains
 
    !> Whether there is more to do than to count avalanches.
    pure function needs_each(self)
-      !> The recorder
       class(avalanche_recorder_type), intent(in) :: self
       !> Whether there is
       logical :: needs_each
@@ -178,7 +163,6 @@ contains
 
    !> Count avalanches of which nothing else is recorded.
    subroutine count_others(self, number, breaks)
-      !> The recorder
       class(avalanche_recorder_type), intent(inout) :: self
       !> Their number
       integer, intent(in) :: number
@@ -191,7 +175,6 @@ contains
 
    !> Begin another run, which has snapshots of its own.
    pure subroutine begin_run(self)
-      !> The recorder
       class(avalanche_recorder_type), intent(inout) :: self
 
       self%taken = 0
@@ -210,9 +193,7 @@ contains
 
    !> Close the present avalanche.
    subroutine close(self, slider, contacts, displacement)
-      !> The recorder
       class(avalanche_recorder_type), intent(inout) :: self
-      !> The slider
       class(slider_type), intent(in) :: slider
       !> The contacts after the avalanche
       class(contacts_type), intent(inout) :: contacts
@@ -271,7 +252,6 @@ contains
 
    !> Report that not all could be recorded.
    subroutine report_failure(self, error)
-      !> The recorder
       class(avalanche_recorder_type), intent(in) :: self
       !> Set if there was not enough memory
       type(error_type), allocatable, intent(inout) :: error
@@ -283,9 +263,7 @@ contains
 
    !> Put the state into an archive or take it out.
    subroutine exchange(self, archive)
-      !> The recorder
       class(avalanche_recorder_type), intent(inout) :: self
-      !> The archive
       type(archive_type), intent(inout) :: archive
 
       call archive%section("avalanches")

@@ -17,18 +17,12 @@ module mesoslip_recording_buffer
       !> Set when there is not enough memory for a row, which is then lost
       type(error_type), allocatable :: failure
    contains
-      !> Set up an empty table
       procedure, non_overridable :: open
-      !> Make room for one more row, and whether there is
       procedure, non_overridable :: reserve
       procedure, non_overridable :: has_room
-      !> Report that rows were lost
       procedure, non_overridable :: report_failure
-      !> Add a row
       procedure, non_overridable :: add
-      !> Take the first rows away
       procedure, non_overridable :: drain
-      !> Put what waits into an archive or take it out
       procedure, non_overridable :: exchange
    end type buffer_type
 
@@ -36,7 +30,6 @@ contains
 
    !> Set up an empty table.
    subroutine open(self, length, room)
-      !> The table
       class(buffer_type), intent(inout) :: self
       !> Numbers in a row, and rows for which there is room at first
       integer, intent(in) :: length, room
@@ -54,7 +47,6 @@ contains
 
    !> Make room for one more row.
    subroutine reserve(self)
-      !> The table
       class(buffer_type), intent(inout) :: self
 
       real(wp), allocatable :: longer(:, :)
@@ -72,7 +64,6 @@ contains
 
    !> Whether there is room for one more row.
    pure function has_room(self)
-      !> The table
       class(buffer_type), intent(in) :: self
       !> Whether there is
       logical :: has_room
@@ -82,7 +73,6 @@ contains
 
    !> Report that rows were lost.
    subroutine report_failure(self, error)
-      !> The table
       class(buffer_type), intent(in) :: self
       !> Set if there was not enough memory for a row
       type(error_type), allocatable, intent(inout) :: error
@@ -99,7 +89,6 @@ contains
 
    !> Add a row.
    subroutine add(self, values)
-      !> The table
       class(buffer_type), intent(inout) :: self
       !> The row
       real(wp), intent(in) :: values(:)
@@ -112,7 +101,6 @@ contains
 
    !> Take the first rows away.
    subroutine drain(self, values)
-      !> The table
       class(buffer_type), intent(inout) :: self
       !> As many rows as are to be taken, shape (numbers in a row, rows)
       real(wp), intent(out) :: values(:, :)
@@ -129,11 +117,8 @@ contains
 
    !> Put what waits into an archive or take it out.
    subroutine exchange(self, name, archive)
-      !> The table
       class(buffer_type), intent(inout) :: self
-      !> Its name
       character(len=*), intent(in) :: name
-      !> The archive
       type(archive_type), intent(inout) :: archive
 
       real(wp), allocatable :: waiting(:, :)

@@ -47,17 +47,11 @@ module mesoslip_recording_minima
       !> relative to the block [m/s], all times the direction of the drive
       type(buffer_type), private :: rows
    contains
-      !> Make room
       procedure, non_overridable :: open
-      !> Forget all minima
       procedure, non_overridable :: clear
-      !> Add a minimum
       procedure, non_overridable :: add
-      !> Force that ringing has regained
       procedure, non_overridable :: regained_force
-      !> Report that not all could be recorded
       procedure, non_overridable :: report_failure
-      !> Put the state into an archive or take it out
       procedure, non_overridable :: exchange
    end type minima_type
 
@@ -65,7 +59,6 @@ contains
 
    !> Make room.
    subroutine open(self)
-      !> The minima
       class(minima_type), intent(inout) :: self
 
       call self%rows%open(row_length, initial_room)
@@ -73,7 +66,6 @@ contains
 
    !> Forget all minima.
    subroutine clear(self)
-      !> The minima
       class(minima_type), intent(inout) :: self
 
       self%rows%count = 0
@@ -81,7 +73,6 @@ contains
 
    !> Add a minimum.
    subroutine add(self, motion, direction, lag)
-      !> The minima
       class(minima_type), intent(inout) :: self
       !> The motion at the minimum
       type(motion_type), intent(in) :: motion
@@ -104,7 +95,6 @@ contains
 
    !> Force that ringing has regained; forget the minima from which it cannot lead here.
    function regained_force(self, motion, direction, half_period) result(regained)
-      !> The minima
       class(minima_type), intent(inout) :: self
       !> The motion at a maximum of the force
       type(motion_type), intent(in) :: motion
@@ -135,7 +125,6 @@ contains
 
    !> The part of the rise of the force from a minimum to a maximum that is ringing.
    pure function ringing(minimum, motion, direction, half_period) result(part)
-      !> The minimum
       real(wp), intent(in) :: minimum(row_length)
       !> The motion at the maximum
       type(motion_type), intent(in) :: motion
@@ -159,7 +148,6 @@ contains
 
    !> Report that not all could be recorded.
    subroutine report_failure(self, error)
-      !> The minima
       class(minima_type), intent(in) :: self
       !> Set if there was not enough memory
       type(error_type), allocatable, intent(inout) :: error
@@ -169,9 +157,7 @@ contains
 
    !> Put the state into an archive or take it out.
    subroutine exchange(self, archive)
-      !> The minima
       class(minima_type), intent(inout) :: self
-      !> The archive
       type(archive_type), intent(inout) :: archive
 
       call self%rows%exchange("minima", archive)

@@ -33,19 +33,12 @@ module mesoslip_recording_recorder
       !> Slips and their traces
       type(slip_recorder_type) :: slips
    contains
-      !> Make room for what will be recorded
       procedure, non_overridable :: open
-      !> Whether so much waits that it should be taken away
       procedure, non_overridable :: is_full
-      !> Maximum time of an advance
       procedure, non_overridable :: max_step
-      !> Record the last advance of a slider
       procedure, non_overridable :: record
-      !> Which steps of a slider need record
       procedure, non_overridable :: step_filter
-      !> Report that not all could be recorded
       procedure, non_overridable :: report_failure
-      !> Put the state into an archive or take it out
       procedure, non_overridable :: exchange
    end type recorder_type
 
@@ -53,7 +46,6 @@ contains
 
    !> Make room for what will be recorded.
    subroutine open(self, parameters)
-      !> The recorder
       class(recorder_type), intent(inout) :: self
 !> Settings of the record
       type(recorder_parameters_type), intent(in) :: parameters
@@ -65,7 +57,6 @@ contains
 
    !> Whether so much waits that it should be taken away.
    pure function is_full(self)
-      !> The recorder
       class(recorder_type), intent(in) :: self
       !> Whether it does
       logical :: is_full
@@ -75,7 +66,6 @@ contains
 
    !> Maximum time of an advance, so that not too many samples of either trace are within it.
    pure function max_step(self) result(time)
-      !> The recorder
       class(recorder_type), intent(in) :: self
       !> The time [s]
       real(wp) :: time
@@ -89,7 +79,6 @@ contains
 
    !> Record the last advance of a slider, before the events at its end.
    subroutine record(self, slider, detached, breaks)
-      !> The recorder
       class(recorder_type), intent(inout) :: self
       !> The slider after its advance
       class(slider_type), intent(in) :: slider
@@ -104,9 +93,7 @@ contains
 
    !> The first step of a slider after which record would do more than take note of the velocity.
    pure function step_filter(self, slider) result(filter)
-      !> The recorder
       class(recorder_type), intent(in) :: self
-      !> The slider
       class(slider_type), intent(in) :: slider
       !> The filter
       type(step_filter_type) :: filter
@@ -118,7 +105,6 @@ contains
 
    !> Report that not all could be recorded.
    subroutine report_failure(self, error)
-      !> The recorder
       class(recorder_type), intent(in) :: self
       !> Set if there was not enough memory
       type(error_type), allocatable, intent(inout) :: error
@@ -129,9 +115,7 @@ contains
 
    !> Put the state into an archive or take it out.
    subroutine exchange(self, archive)
-      !> The recorder
       class(recorder_type), intent(inout) :: self
-      !> The archive
       type(archive_type), intent(inout) :: archive
 
       call self%trace%exchange(archive)

@@ -41,26 +41,17 @@ module mesoslip_recording_slip_trace
       !> Whether the present trace has been of a slip
       logical, private :: has_slip = .false.
    contains
-      !> Make room for samples
       procedure, non_overridable :: open
-      !> Samples that can be taken away
       procedure, non_overridable :: final_samples
-      !> Take samples away
       procedure, non_overridable :: drain
-      !> Take the samples up to a time within the last advance of a slider
       procedure, non_overridable :: take_samples
-      !> A fall of the force starts, comes to a slip, or to no slip
       procedure, non_overridable :: begin
       procedure, non_overridable :: confirm
       procedure, non_overridable :: drop
       procedure, non_overridable :: drop_or_stop
-      !> A slip is over; the trace goes on
       procedure, non_overridable :: keep
-      !> End the trace
       procedure, non_overridable :: stop
-      !> Report that not all could be recorded
       procedure, non_overridable :: report_failure
-      !> Put the state into an archive or take it out
       procedure, non_overridable :: exchange
    end type slip_trace_type
 
@@ -68,7 +59,6 @@ contains
 
    !> Make room for samples.
    subroutine open(self, interval)
-      !> The traces
       class(slip_trace_type), intent(inout) :: self
       !> Interval of the samples [s], 0 for none
       real(wp), intent(in) :: interval
@@ -79,7 +69,6 @@ contains
 
    !> Samples that can be taken away: not those of a fall that may come to no slip.
    pure function final_samples(self, is_undecided) result(number)
-      !> The traces
       class(slip_trace_type), intent(in) :: self
       !> Whether there is such a fall
       logical, intent(in) :: is_undecided
@@ -92,7 +81,6 @@ contains
 
    !> Take samples away.
    subroutine drain(self, values)
-      !> The traces
       class(slip_trace_type), intent(inout) :: self
       !> As many samples as can be taken or fewer, shape (slip_trace_length, samples)
       real(wp), intent(out) :: values(:, :)
@@ -103,7 +91,6 @@ contains
 
    !> Take the samples up to a time within the last advance of a slider.
    subroutine take_samples(self, slider, detached, end_time)
-      !> The traces
       class(slip_trace_type), intent(inout) :: self
       !> The slider after its advance
       class(slider_type), intent(in) :: slider
@@ -123,7 +110,6 @@ contains
 
    !> A fall of the force starts; a trace of the slip before goes on in the samples of the fall.
    subroutine begin(self, time, slip)
-      !> The traces
       class(slip_trace_type), intent(inout) :: self
       !> Time of the start [s]
       real(wp), intent(in) :: time
@@ -143,7 +129,6 @@ contains
 
    !> The fall has come to a slip: its samples are of this one.
    subroutine confirm(self, slip)
-      !> The traces
       class(slip_trace_type), intent(inout) :: self
       !> Number of the slip
       integer(i8), intent(in) :: slip
@@ -155,7 +140,6 @@ contains
 
    !> The fall has come to no slip: its samples are those of the slip before, if any.
    subroutine drop(self)
-      !> The traces
       class(slip_trace_type), intent(inout) :: self
 
       if (.not. self%has_slip) self%rows%count = min(self%rows%count, self%kept_count)
@@ -163,7 +147,6 @@ contains
 
    !> The fall has come to no slip: the trace goes on only after a slip.
    subroutine drop_or_stop(self)
-      !> The traces
       class(slip_trace_type), intent(inout) :: self
 
       call self%drop()
@@ -172,7 +155,6 @@ contains
 
    !> A slip is over; the trace goes on.
    subroutine keep(self)
-      !> The traces
       class(slip_trace_type), intent(inout) :: self
 
       self%kept_count = self%rows%count
@@ -180,7 +162,6 @@ contains
 
    !> End the trace: no samples until the next fall.
    subroutine stop(self)
-      !> The traces
       class(slip_trace_type), intent(inout) :: self
 
       self%is_active = .false.
@@ -190,7 +171,6 @@ contains
 
    !> Report that not all could be recorded.
    subroutine report_failure(self, error)
-      !> The traces
       class(slip_trace_type), intent(in) :: self
       !> Set if there was not enough memory
       type(error_type), allocatable, intent(inout) :: error
@@ -200,9 +180,7 @@ contains
 
    !> Put the state into an archive or take it out.
    subroutine exchange(self, archive)
-      !> The traces
       class(slip_trace_type), intent(inout) :: self
-      !> The archive
       type(archive_type), intent(inout) :: archive
 
       call archive%section("slip trace")

@@ -94,22 +94,14 @@ module mesoslip_recording_slips
       !> Latest minima of the force
       type(minima_type), private :: minima
    contains
-      !> Make room for what will be recorded
       procedure, non_overridable :: open
-      !> Whether so much waits that it should be taken away
       procedure, non_overridable :: is_full
-      !> Samples of traces that can be taken away
       procedure, non_overridable :: final_samples
-      !> Record the last advance of a slider
       procedure, non_overridable :: record
-      !> Which steps of a slider need record, and take note of those that did not
       procedure, non_overridable :: narrow
       procedure, non_overridable :: skip_steps
-      !> Close a slip at the end of the run
       procedure, non_overridable :: finish
-      !> Report that not all could be recorded
       procedure, non_overridable :: report_failure
-      !> Put the state into an archive or take it out
       procedure, non_overridable :: exchange
       procedure, non_overridable, private :: change_stage, pass_maximum, pass_minimum
       procedure, non_overridable, private :: begin_fall, drop_fall, close_slip, update, update_peak
@@ -120,7 +112,6 @@ contains
 
    !> Make room for what will be recorded.
    subroutine open(self, parameters)
-      !> The recorder
       class(slip_recorder_type), intent(inout) :: self
 !> Settings of the record
       type(slip_parameters_type), intent(in) :: parameters
@@ -133,7 +124,6 @@ contains
 
    !> Whether so much waits that it should be taken away.
    pure function is_full(self)
-      !> The recorder
       class(slip_recorder_type), intent(in) :: self
       !> Whether it does
       logical :: is_full
@@ -143,7 +133,6 @@ contains
 
    !> Samples of traces that can be taken away: not those of a fall that may come to no slip.
    pure function final_samples(self) result(number)
-      !> The recorder
       class(slip_recorder_type), intent(in) :: self
       !> Their number
       integer :: number
@@ -153,7 +142,6 @@ contains
 
    !> Record the last advance of a slider, before the events at its end.
    subroutine record(self, slider, detached, breaks)
-      !> The recorder
       class(slip_recorder_type), intent(inout) :: self
       !> The slider after its advance
       class(slider_type), intent(in) :: slider
@@ -187,11 +175,8 @@ contains
    !> It is where the excess over the velocity of the drive leaves the interval, between 0 and the
    !> slip velocity, in which it is, or where something is due.
    pure subroutine narrow(self, slider, filter)
-      !> The recorder
       class(slip_recorder_type), intent(in) :: self
-      !> The slider
       class(slider_type), intent(in) :: slider
-      !> The filter
       type(step_filter_type), intent(inout) :: filter
 
       real(wp) :: fast
@@ -232,7 +217,6 @@ contains
 
    !> Take note of steps of a slider that were of no interest.
    subroutine skip_steps(self, filter)
-      !> The recorder
       class(slip_recorder_type), intent(inout) :: self
       !> The filter after these steps
       type(step_filter_type), intent(in) :: filter
@@ -426,7 +410,6 @@ contains
 
    !> Close a slip at the end of the run, if its spring force has passed the minimum.
    subroutine finish(self)
-      !> The recorder
       class(slip_recorder_type), intent(inout) :: self
 
       if (self%phase == phase_slip) call self%close_slip()
@@ -436,7 +419,6 @@ contains
 
    !> Report that not all could be recorded.
    subroutine report_failure(self, error)
-      !> The recorder
       class(slip_recorder_type), intent(in) :: self
       !> Set if there was not enough memory
       type(error_type), allocatable, intent(inout) :: error
@@ -448,9 +430,7 @@ contains
 
    !> Put the state into an archive or take it out.
    subroutine exchange(self, archive)
-      !> The recorder
       class(slip_recorder_type), intent(inout) :: self
-      !> The archive
       type(archive_type), intent(inout) :: archive
 
       call archive%section("slips")

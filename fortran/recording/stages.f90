@@ -36,16 +36,11 @@ module mesoslip_recording_stages
       real(wp), private :: start_time = 0.0_wp, start_velocity = 0.0_wp, start_force = 0.0_wp, &
          & start_displacement = 0.0_wp, drive_start_displacement = 0.0_wp
    contains
-      !> Make room
       procedure, non_overridable :: open
-      !> Whether so much waits that it should be taken away
       procedure, non_overridable :: is_full
-      !> A stage begins, and is over
       procedure, non_overridable :: begin
       procedure, non_overridable :: finish
-      !> Report that not all could be recorded
       procedure, non_overridable :: report_failure
-      !> Put the state into an archive or take it out
       procedure, non_overridable :: exchange
    end type stage_recorder_type
 
@@ -53,7 +48,6 @@ contains
 
    !> Make room.
    subroutine open(self)
-      !> The recorder
       class(stage_recorder_type), intent(inout) :: self
 
       call self%rows%open(stage_length, 1)
@@ -61,7 +55,6 @@ contains
 
    !> Whether so much waits that it should be taken away.
    pure function is_full(self)
-      !> The recorder
       class(stage_recorder_type), intent(in) :: self
       !> Whether it does
       logical :: is_full
@@ -71,9 +64,7 @@ contains
 
    !> A stage begins: the drive has taken its velocity.
    subroutine begin(self, slider, number)
-      !> The recorder
       class(stage_recorder_type), intent(inout) :: self
-      !> The slider
       class(slider_type), intent(inout) :: slider
       !> Number of the stage
       integer, intent(in) :: number
@@ -93,7 +84,6 @@ contains
 
    !> A stage is over.
    subroutine finish(self, slider)
-      !> The recorder
       class(stage_recorder_type), intent(inout) :: self
       !> The slider at the end of the stage
       class(slider_type), intent(inout) :: slider
@@ -119,7 +109,6 @@ contains
 
    !> Report that not all could be recorded.
    subroutine report_failure(self, error)
-      !> The recorder
       class(stage_recorder_type), intent(in) :: self
       !> Set if there was not enough memory
       type(error_type), allocatable, intent(inout) :: error
@@ -129,9 +118,7 @@ contains
 
    !> Put the state into an archive or take it out.
    subroutine exchange(self, archive)
-      !> The recorder
       class(stage_recorder_type), intent(inout) :: self
-      !> The archive
       type(archive_type), intent(inout) :: archive
 
       call archive%section("stages")

@@ -32,14 +32,10 @@ module mesoslip_recording_steady
       !> Means over the latest blocks, each at its number modulo their number, shape (2 blocks) [N]
       real(wp), allocatable, private :: mean(:)
    contains
-      !> Set what to look for
       procedure, non_overridable :: open
       procedure, non_overridable :: is_open
-      !> Begin with the first block
       procedure, non_overridable :: begin
-      !> A block is over
       procedure, non_overridable :: end_block
-      !> Put the state into an archive or take it out
       procedure, non_overridable :: exchange
    end type steady_recorder_type
 
@@ -47,7 +43,6 @@ contains
 
    !> Set what to look for.
    subroutine open(self, distance, blocks, tolerance)
-      !> The recorder
       class(steady_recorder_type), intent(inout) :: self
       !> Distance of the drive in a block [m], 0 for nothing to look for
       real(wp), intent(in) :: distance
@@ -68,7 +63,6 @@ contains
 
    !> Whether it is set what to look for.
    pure function is_open(self)
-      !> The recorder
       class(steady_recorder_type), intent(in) :: self
       !> Whether it is
       logical :: is_open
@@ -78,7 +72,6 @@ contains
 
    !> Begin with the first block.
    subroutine begin(self, time, velocity, impulse)
-      !> The recorder
       class(steady_recorder_type), intent(inout) :: self
       !> Time now [s], constant velocity of the drive [m/s], its impulse in the stage so far [N s]
       real(wp), intent(in) :: time, velocity, impulse
@@ -94,7 +87,6 @@ contains
 
    !> A block is over: is the state steady?
    subroutine end_block(self, impulse, is_steady)
-      !> The recorder
       class(steady_recorder_type), intent(inout) :: self
       !> Impulse of the drive in the stage so far [N s]
       real(wp), intent(in) :: impulse
@@ -127,12 +119,8 @@ contains
 
    !> Put the state into an archive or take it out.
    subroutine exchange(self, archive)
-      !> The recorder
       class(steady_recorder_type), intent(inout) :: self
-      !> The archive
       type(archive_type), intent(inout) :: archive
-
-      real(wp), allocatable :: mean(:)
 
       call archive%section("steady state")
       call archive%exchange("block_end", self%block_end)
@@ -140,9 +128,7 @@ contains
       call archive%exchange("duration", self%duration)
       call archive%exchange("number", self%number)
       call archive%exchange("impulse", self%impulse)
-      mean = self%mean
-      call archive%exchange("mean", mean)
-      if (size(mean) == size(self%mean)) self%mean(:) = mean
+      call archive%exchange_fixed("mean", [size(self%mean), 1], self%mean)
    end subroutine exchange
 
 end module mesoslip_recording_steady

@@ -42,17 +42,11 @@ module mesoslip_recording_trace
       !> Samples so far
       integer(i8), private :: samples = 0
    contains
-      !> Make room for samples
       procedure, non_overridable :: open
-      !> Begin another run
       procedure, non_overridable :: begin
-      !> Whether so many samples wait that they should be taken away
       procedure, non_overridable :: is_full
-      !> Take the samples within the last advance of a slider
       procedure, non_overridable :: take_samples
-      !> Report that not all could be recorded
       procedure, non_overridable :: report_failure
-      !> Put the state into an archive or take it out
       procedure, non_overridable :: exchange
    end type trace_type
 
@@ -60,7 +54,6 @@ contains
 
    !> Make room for samples.
    subroutine open(self, interval, duration, layers)
-      !> The trace
       class(trace_type), intent(inout) :: self
       !> Interval of the samples, and time at which the run ends [s]
       real(wp), intent(in) :: interval, duration
@@ -76,7 +69,6 @@ contains
 
    !> Begin another run with a sample. The samples of the earlier run go on if this is one of them.
    pure subroutine begin(self, time)
-      !> The trace
       class(trace_type), intent(inout) :: self
       !> Time of the sample [s]
       real(wp), intent(in) :: time
@@ -92,7 +84,6 @@ contains
 
    !> Whether so many samples wait that they should be taken away.
    pure function is_full(self)
-      !> The trace
       class(trace_type), intent(in) :: self
       !> Whether it does
       logical :: is_full
@@ -102,7 +93,6 @@ contains
 
    !> Take the samples within the last advance of a slider.
    subroutine take_samples(self, slider, detached)
-      !> The trace
       class(trace_type), intent(inout) :: self
       !> The slider after its advance
       class(slider_type), intent(in) :: slider
@@ -130,7 +120,6 @@ contains
 
    !> A sample of the motion.
    pure function sample_of(motion, detached) result(sample)
-      !> The motion
       type(motion_type), intent(in) :: motion
       !> Detached contacts
       real(wp), intent(in) :: detached
@@ -144,7 +133,6 @@ contains
 
    !> Report that not all could be recorded.
    subroutine report_failure(self, error)
-      !> The trace
       class(trace_type), intent(in) :: self
       !> Set if there was not enough memory
       type(error_type), allocatable, intent(inout) :: error
@@ -155,9 +143,7 @@ contains
 
    !> Put the state into an archive or take it out.
    subroutine exchange(self, archive)
-      !> The trace
       class(trace_type), intent(inout) :: self
-      !> The archive
       type(archive_type), intent(inout) :: archive
 
       call archive%section("trace")

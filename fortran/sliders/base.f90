@@ -1,4 +1,4 @@
-!> Interface of every slider: move under a linear law of the contact force, and say where it is.
+!> Interface of every slider: move under a linear law of the contact force, and report the motion.
 !>
 !> A slider has a drive, and is independent of contacts. Displacements are relative to an origin
 !> that moves along with the slider, so that they keep their digits however far it goes.
@@ -38,7 +38,7 @@ module mesoslip_sliders_base
       real(wp) :: pulled_velocity = 0.0_wp
    end type motion_type
 
-   !> A slider: what it has in common whatever its kind.
+   !> A slider of any kind.
    type, abstract :: slider_type
       !> Time [s]
       real(wp) :: time = 0.0_wp
@@ -52,18 +52,18 @@ module mesoslip_sliders_base
       real(wp) :: acceleration = 0.0_wp, start_acceleration = 0.0_wp
       !> Sign of the last velocity that was not zero
       real(wp) :: direction = 1.0_wp
-      !> The drive
       type(drive_type) :: drive
       !> Time at which the last advance started [s]
       real(wp) :: step_time = 0.0_wp
-      !> Lost in the drag of contacts and in the slider's damping [J]
+      !> Energy lost in the drag of contacts and in the slider's damping [J]
       type(accumulator_type) :: drag_loss, damping_loss
-      !> Whether it is faster than the drive where the drive's spring pulls: the force falls
-      logical :: is_faster = .false.
+      !> Whether the force of the drive has extremes where the slider passes the velocity of the
+      !> drive, and whether the slider is faster where the drive's spring pulls: the force falls
+      logical :: has_passages = .false., is_faster = .false.
       !> One over the mass that the contact force moves [1/kg], and the rate of the slider's own
       !> oscillation [1/s]; 0 if its motion is prescribed
       real(wp) :: inverse_mass = 0.0_wp, own_rate = 0.0_wp
-      !> Whether it goes where the drive goes
+      !> Whether it moves as the drive does
       logical :: follows_drive = .false.
       !> Cost of an advance over that of a rigid slider
       real(wp) :: cost = 1.0_wp
@@ -72,57 +72,41 @@ module mesoslip_sliders_base
       !> Clocks of the contacts, which end an advance as its window does; whether there are any
       type(hazard_clock_type) :: clock(clocks)
       logical :: has_clocks = .false.
-      !> Set when the slider cannot go on
+      !> Set when the slider cannot continue
       type(error_type), allocatable :: failure
    contains
-      !> Put the slider at rest in balance with the contacts
       procedure(start_interface), deferred :: start
-      !> Move until the first end of a window, or less far
       procedure(advance_interface), deferred :: advance
-      !> The motion at a time of the last advance
       procedure(observe_interface), deferred :: observe
-      !> Kinetic energy and that of the drive's spring
       procedure(energy_interface), deferred :: energy
-      !> Where it is
       procedure, non_overridable :: pose
-      !> Take note that the drive has changed
       procedure :: adapt_to_drive
-      !> Whether a run that is put away now goes on to the bit
       procedure :: can_pause
-      !> Velocity where the drive's spring pulls
       procedure :: pulled_velocity
-      !> Move the origin of displacements
       procedure :: shift_origin => shift_slider
-      !> Take the force of the drive at a time of the last advance into account in its extremes
       procedure, non_overridable :: note_force
-      !> The same now, where the drive has changed
       procedure, non_overridable :: mark_extreme
-      !> Look for an extreme of the force in the last advance, and select steps that may have one
-      procedure :: note_extreme
-      procedure :: select_extremes
-      !> Displacements of the layers at a time of the last advance
+      procedure, non_overridable :: note_extreme
+      procedure, non_overridable :: select_extremes
       procedure :: observe_layers
-      !> Put the state into an archive or take it out
       procedure :: exchange => exchange_slider
    end type slider_type
 
    abstract interface
-      !> Put the slider at rest in balance with the contacts.
+      !> Put the slider, its displacement being zero, at rest in balance with the contacts.
       subroutine start_interface(self, law)
          import :: slider_type, interface_law_type
          implicit none
-         !> The slider, its displacement zero
          class(slider_type), intent(inout) :: self
          !> Contact force at the start
          type(interface_law_type), intent(in) :: law
       end subroutine start_interface
 
-      !> Move until the first end of a window, or less far.
+      !> Move until the first end of a window, or less far. At an end the slider's displacement or
+      !> time equals the window's to the bit.
       subroutine advance_interface(self, law, window)
          import :: slider_type, interface_law_type, window_type
          implicit none
-         !> The slider; on return at an end of the window, or inside it.
-         !> At an end its displacement or time equals the window's to the bit.
          class(slider_type), intent(inout) :: self
          !> Contact force
          type(interface_law_type), intent(in) :: law
@@ -134,7 +118,6 @@ module mesoslip_sliders_base
       pure function observe_interface(self, time) result(motion)
          import :: slider_type, motion_type, wp
          implicit none
-         !> The slider
          class(slider_type), intent(in) :: self
          !> Time [s]
          real(wp), intent(in) :: time
@@ -146,7 +129,6 @@ module mesoslip_sliders_base
       pure function energy_interface(self) result(energy)
          import :: slider_type, wp
          implicit none
-         !> The slider
          class(slider_type), intent(in) :: self
          !> Energy [J]
          real(wp) :: energy
@@ -157,9 +139,7 @@ contains
 
    !> Pose of the slider.
    pure function pose(self)
-      !> The slider
       class(slider_type), intent(in) :: self
-      !> Where it is
       type(pose_type) :: pose
 
       pose = pose_type(self%time, self%displacement, self%velocity, self%acceleration, &
@@ -168,19 +148,16 @@ contains
          & .and. .not. abs(self%acceleration) > 0.0_wp)
    end function pose
 
-   !> Take note that the drive has changed: most sliders need nothing more.
+   !> Adapt to a change of the drive: most sliders need not.
    subroutine adapt_to_drive(self)
-      !> The slider
       class(slider_type), intent(inout) :: self
 
    end subroutine adapt_to_drive
 
-   !> Whether a run that is put away now goes on to the bit: it does where all of the slider's state
-   !> can be put away.
+   !> Whether a run that is saved now continues to the bit: where all of the slider's state can be
+   !> saved.
    pure function can_pause(self)
-      !> The slider
       class(slider_type), intent(in) :: self
-      !> Whether it does
       logical :: can_pause
 
       can_pause = .true.
@@ -188,7 +165,6 @@ contains
 
    !> Velocity, at the end of the last advance, where the drive's spring pulls.
    pure function pulled_velocity(self) result(velocity)
-      !> The slider
       class(slider_type), intent(in) :: self
       !> Velocity [m/s]
       real(wp) :: velocity
@@ -198,7 +174,6 @@ contains
 
    !> Take the force of the drive at a time of the last advance into account in its extremes.
    subroutine note_force(self, time)
-      !> The slider
       class(slider_type), intent(inout) :: self
       !> Time [s]
       real(wp), intent(in) :: time
@@ -211,22 +186,21 @@ contains
 
    !> The drive has changed: its force may have an extreme here.
    subroutine mark_extreme(self)
-      !> The slider
       class(slider_type), intent(inout) :: self
 
       call self%note_force(self%time)
       self%is_faster = self%pulled_velocity() > self%drive%rate
    end subroutine mark_extreme
 
-   !> Look for an extreme of the force in the last advance: that of a spring has one where the
-   !> slider passes the velocity of the drive. Of two passages within one step, between which the
-   !> force hardly changes, nothing is found.
+   !> Look for an extreme of the force in the last advance, where the slider passes the velocity of
+   !> the drive. Two passages within one step, between which the force hardly changes, are missed.
+   !> Other sliders note extremes in each advance, or have none between changes of the drive.
    subroutine note_extreme(self)
-      !> The slider
       class(slider_type), intent(inout) :: self
 
       logical :: is_faster
 
+      if (.not. self%has_passages) return
       is_faster = self%pulled_velocity() > self%drive%rate_at(self%time)
       if (is_faster .eqv. self%is_faster) return
       self%is_faster = is_faster
@@ -236,11 +210,10 @@ contains
    !> Let a filter select the steps in which the slider passes the velocity of the drive, which is
    !> constant.
    pure subroutine select_extremes(self, filter)
-      !> The slider
       class(slider_type), intent(in) :: self
-      !> The filter
       type(step_filter_type), intent(inout) :: filter
 
+      if (.not. self%has_passages) return
       if (self%is_faster .eqv. filter%direction > 0.0_wp) then
          filter%min_excess = max(filter%min_excess, merge(0.0_wp, -tiny(1.0_wp), self%is_faster))
       else
@@ -294,9 +267,8 @@ contains
 
    end function passage
 
-   !> Move the origin of displacements; what can be observed of the last advance is its end.
+   !> Move the origin of displacements; of the last advance only the end can be observed then.
    subroutine shift_slider(self, shift)
-      !> The slider
       class(slider_type), intent(inout) :: self
       !> Displacement of the new origin [m]
       real(wp), intent(in) :: shift
@@ -308,7 +280,6 @@ contains
 
    !> Displacements of the layers at a time of the last advance: without layers, that of the slider.
    pure subroutine observe_layers(self, time, displacement)
-      !> The slider
       class(slider_type), intent(in) :: self
       !> Time [s]
       real(wp), intent(in) :: time
@@ -323,9 +294,7 @@ contains
 
    !> Put the state into an archive or take it out.
    subroutine exchange_slider(self, archive)
-      !> The slider
       class(slider_type), intent(inout) :: self
-      !> The archive
       type(archive_type), intent(inout) :: archive
 
       call archive%exchange("time", self%time)
@@ -345,7 +314,6 @@ contains
 
    !> Let a law of the contact force count displacements from another origin.
    pure subroutine shift_law(law, shift)
-      !> The law
       type(interface_law_type), intent(inout) :: law
       !> Displacement of the new origin [m]
       real(wp), intent(in) :: shift
@@ -355,9 +323,7 @@ contains
 
    !> Put a law of the contact force into an archive or take it out.
    subroutine exchange_law(law, archive)
-      !> The law
       type(interface_law_type), intent(inout) :: law
-      !> The archive
       type(archive_type), intent(inout) :: archive
 
       call archive%exchange("law stiffness", law%stiffness)

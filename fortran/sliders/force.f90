@@ -12,24 +12,19 @@ module mesoslip_sliders_force
    use mesoslip_numerics_quadrature, only: gauss_legendre
    use mesoslip_sliders_base, only: exchange_law, exchange_slider, motion_type, slider_type
    use mesoslip_sliders_hazard_clock, only: advance_clocks, limit_window
-   use mesoslip_sliders_motion_series, only: first_end, horner, integral, inverse, second_integral
-   use mesoslip_step_filter, only: step_filter_type
+   use mesoslip_sliders_motion_series, only: first_end, horner, integral, inverse, long_time, &
+      & rounding, second_integral
    implicit none
    private
 
    public :: slider_force_type, make_slider_force
 
-   !> Terms of the series, and the length of the longest step in units of the fastest rate: what the
-   !> series leaves out is less than 1e-16 of its leading terms.
+   !> Terms of the series, and maximum length of a step in units of the fastest rate: the terms left
+   !> out are less than 1e-16 of the first ones.
    integer, parameter :: terms = 17
    real(wp), parameter :: max_step = 0.5_wp
-   !> Duration of a step over the time of an oscillation, per radian, beyond which one that the
-   !> contact force does not resolve counts as none
-   real(wp), parameter :: long_time = 2.0_wp
    !> Points of the rule for the losses of a step
    integer, parameter :: nodes = 6
-   !> Forces that differ by this part are equal up to rounding.
-   real(wp), parameter :: rounding = 16.0_wp * epsilon(1.0_wp)
 
    !> A slider with mass under a force.
    type, extends(slider_type) :: slider_force_type
@@ -47,8 +42,6 @@ module mesoslip_sliders_force
       procedure :: advance
       procedure :: observe
       procedure :: energy
-      procedure :: note_extreme
-      procedure :: select_extremes
       procedure :: shift_origin
       procedure :: exchange
    end type slider_force_type
@@ -57,11 +50,8 @@ contains
 
    !> Set up a slider under a force from named numbers.
    subroutine make_slider_force(slider, parameters, error)
-      !> The slider
       class(slider_type), allocatable, intent(out) :: slider
-      !> Mass and damping
       type(parameters_type), intent(inout) :: parameters
-      !> Set if a number is missing or superfluous
       type(error_type), allocatable, intent(inout) :: error
 
       type(slider_force_type), allocatable :: self
@@ -76,11 +66,9 @@ contains
       call move_alloc(self, slider)
    end subroutine make_slider_force
 
-   !> Put the slider at rest; the force is not in balance with the contacts, but acts from now on.
+   !> The slider starts at rest; the force, not in balance with the contacts, acts from now on.
    subroutine start(self, law)
-      !> The slider, its displacement zero
       class(slider_force_type), intent(inout) :: self
-      !> Contact force at the start
       type(interface_law_type), intent(in) :: law
 
       self%law = law
@@ -89,13 +77,9 @@ contains
       self%series = 0.0_wp
    end subroutine start
 
-   !> Move until the first end of a window, or less far.
    subroutine advance(self, law, window)
-      !> The slider
       class(slider_force_type), intent(inout) :: self
-      !> Contact force
       type(interface_law_type), intent(in) :: law
-      !> Where the law holds
       type(window_type), intent(in) :: window
 
       type(window_type) :: bounds
@@ -121,12 +105,11 @@ contains
       if (abs(self%velocity) > 0.0_wp) self%direction = sign(1.0_wp, self%velocity)
    end subroutine advance
 
-   !> Acceleration of the slider where it is.
+   !> Acceleration of the slider where it is [m/s2].
    pure function acceleration_under(self, force, since) result(acceleration)
       type(slider_force_type), intent(in) :: self
       !> Force [N], and time since the start of the advance [s]
       real(wp), intent(in) :: force, since
-      !> Acceleration [m/s2]
       real(wp) :: acceleration
 
       acceleration = self%inverse_mass * ((force - (self%law%stiffness * self%displacement &
@@ -134,17 +117,16 @@ contains
          & - self%damping * self%velocity
    end function acceleration_under
 
-   !> Velocity of uniform creep under a force that changes linearly.
+   !> Velocity of uniform creep under a force that changes linearly [m/s].
    pure function creep_velocity(self) result(velocity)
       type(slider_force_type), intent(in) :: self
-      !> Velocity [m/s]
       real(wp) :: velocity
 
       velocity = (self%drive%rate - self%law%rate) / self%law%stiffness
    end function creep_velocity
 
-   !> Whether the motion differs from uniform creep by rounding only, or by what the contact force
-   !> does not resolve. Contacts that hold the slider and a damper bring it there.
+   !> Whether the motion differs from uniform creep by less than rounding or the resolution of the
+   !> contact force. Pinned contacts and a damper lead to creep.
    pure function is_settled(self, force, step) result(settled)
       type(slider_force_type), intent(in) :: self
       !> Force [N], and duration of the step [s]
@@ -164,11 +146,10 @@ contains
          & * abs(self%velocity - creep_velocity(self)) <= noise
    end function is_settled
 
-   !> Whether a step is so long that an oscillation which the contact force does not resolve counts
-   !> as none.
+   !> Whether a step is so long that an oscillation below the resolution of the contact force is
+   !> ignored.
    pure function is_long(self, step)
       type(slider_force_type), intent(in) :: self
-      !> Duration [s]
       real(wp), intent(in) :: step
       logical :: is_long
 
@@ -180,7 +161,7 @@ contains
    subroutine glide(self, window, step)
       type(slider_force_type), intent(inout) :: self
       type(window_type), intent(in) :: window
-      !> Duration [s]
+      !> Duration of the motion [s]
       real(wp), intent(out) :: step
 
       real(wp) :: velocity, gap, target, longest
@@ -188,7 +169,7 @@ contains
 
       step = window%end_time - self%time
       velocity = creep_velocity(self)
-      ! The slider comes to where it is in balance at the end of the step.
+      ! The slider is in balance at the end of the step.
       if (is_long(self, step)) velocity = velocity &
          & + self%start_acceleration * self%mass / (self%law%stiffness * step)
       self%velocity = velocity
@@ -210,7 +191,7 @@ contains
    subroutine move(self, window, step)
       type(slider_force_type), intent(inout) :: self
       type(window_type), intent(in) :: window
-      !> Duration [s]
+      !> Duration of the motion [s]
       real(wp), intent(out) :: step
 
       real(wp) :: rate, change, target, direction
@@ -252,8 +233,8 @@ contains
       if (turns) self%velocity = 0.0_wp
    end subroutine move
 
-   !> Start from rest where a growing force turns the slider within the resolution of the time: it
-   !> would turn there without end.
+   !> Start from rest where a growing force turns the slider within the resolution of time: it would
+   !> turn there without end.
    subroutine forget_rounding(self)
       type(slider_force_type), intent(inout) :: self
 
@@ -286,7 +267,7 @@ contains
       end do
    end subroutine expand
 
-   !> Add the work and the impulse of the force in a step, and the losses, to the energy balance.
+   !> Add work and impulse of the force in a step, and the losses, to the energy balance.
    subroutine add_work(self, force, step)
       type(slider_force_type), intent(inout) :: self
       !> Force at the start [N], and duration [s]
@@ -310,13 +291,10 @@ contains
       call self%damping_loss%add(self%mass * self%damping * squares)
    end subroutine add_work
 
-   !> The motion at a time of the last advance.
+   !> The drive's displacement is that of the slider.
    pure function observe(self, time) result(motion)
-      !> The slider
       class(slider_force_type), intent(in) :: self
-      !> Time [s]
       real(wp), intent(in) :: time
-      !> The motion; the drive is where the slider is
       type(motion_type) :: motion
 
       real(wp) :: step, displacement
@@ -334,37 +312,16 @@ contains
          & + self%law%drag * motion%velocity + self%law%rate * step
    end function observe
 
-   !> Kinetic energy.
    pure function energy(self)
-      !> The slider
       class(slider_force_type), intent(in) :: self
-      !> Energy [J]
       real(wp) :: energy
 
       energy = 0.5_wp * self%mass * self%velocity**2
    end function energy
 
-   !> The force is prescribed: its extremes are where the drive changes.
-   subroutine note_extreme(self)
-      !> The slider
-      class(slider_force_type), intent(inout) :: self
-
-   end subroutine note_extreme
-
-   !> No step has an extreme of the force.
-   pure subroutine select_extremes(self, filter)
-      !> The slider
-      class(slider_force_type), intent(in) :: self
-      !> The filter
-      type(step_filter_type), intent(inout) :: filter
-
-   end subroutine select_extremes
-
-   !> Move the origin of displacements, which the force does not depend on.
+   !> The force does not depend on the origin.
    subroutine shift_origin(self, shift)
-      !> The slider
       class(slider_force_type), intent(inout) :: self
-      !> Displacement of the new origin [m]
       real(wp), intent(in) :: shift
 
       call self%drive%rebase(self%time, 0.0_wp)
@@ -372,22 +329,15 @@ contains
       self%origin = self%origin + shift
    end subroutine shift_origin
 
-   !> Put the state into an archive or take it out.
    subroutine exchange(self, archive)
-      !> The slider
       class(slider_force_type), intent(inout) :: self
-      !> The archive
       type(archive_type), intent(inout) :: archive
-
-      real(wp), allocatable :: series(:)
 
       call archive%section("slider under a force")
       call exchange_slider(self, archive)
       call exchange_law(self%law, archive)
       call archive%exchange("start_displacement", self%start_displacement)
-      series = self%series
-      call archive%exchange("series", series)
-      if (size(series) == size(self%series)) self%series = series
+      call archive%exchange_fixed("series", [terms, 1], self%series)
    end subroutine exchange
 
 end module mesoslip_sliders_force

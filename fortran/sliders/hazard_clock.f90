@@ -1,9 +1,9 @@
-!> Clocks of thermally activated breaking: when they come to a reading during a motion.
+!> Clocks of thermally activated breaking: the time in a motion at which one reaches a reading.
 !>
-!> The reading is the integral of exp(slope X) over the motion, which is known as a series of the
-!> velocity. In most steps between two events the exponent changes so little that the reading is a
-!> series in the time, too. In others it is a Gauss rule over parts of a step so short that the rule
-!> is exact to rounding, and the time of a reading is found by Halley's method.
+!> The reading is the integral of exp(slope X) over the motion, which is a series of the velocity.
+!> In most steps between two events the exponent changes so little that the reading is a series in
+!> time, too. In others it is a Gauss rule over parts of a step so short that the rule is exact to
+!> rounding, and the time of a reading is found by Halley's method.
 module mesoslip_sliders_hazard_clock
    use mesoslip_interface_law, only: clocks, hazard_clock_type, window_type
    use mesoslip_numerics_kinds, only: wp
@@ -14,15 +14,15 @@ module mesoslip_sliders_hazard_clock
 
    public :: advance_clocks, limit_window, time_to_reading, reading_after
 
-   !> Time over that in which a clock is expected to come to its reading after which a window ends
+   !> Duration of a window over the time in which a clock is expected to reach its reading
    real(wp), parameter :: window_ratio = 1.25_wp
 
    !> Maximum change of the exponent in a part of a step, in which the rule is exact to rounding
    real(wp), parameter :: max_change = 0.5_wp
-   !> Relative change of a time after which one more step changes nothing: convergence is cubic
+   !> Relative change of a time after which another iteration changes nothing: convergence is cubic
    real(wp), parameter :: converged = 1.0e-6_wp
    integer, parameter :: max_iterations = 60
-   !> Change of an exponent below which eight terms of a series do
+   !> Change of an exponent below which eight terms of a series are enough
    real(wp), parameter :: small = 1.0e-2_wp
 
    integer :: i
@@ -52,14 +52,12 @@ module mesoslip_sliders_hazard_clock
 
 contains
 
-   !> End a window where no clock is expected to need it any more: a step that is not much longer
-   !> than needed takes less time.
+   !> End a window a little after the first clock is expected to reach its reading: a shorter step
+   !> takes less time to compute.
    pure subroutine limit_window(clock, time, velocity, acceleration, window)
-      !> The clocks
       type(hazard_clock_type), intent(in) :: clock(clocks)
       !> Time [s], velocity [m/s] and acceleration [m/s2] of the slider
       real(wp), intent(in) :: time, velocity, acceleration
-      !> The window
       type(window_type), intent(inout) :: window
 
       real(wp) :: expected
@@ -92,15 +90,14 @@ contains
          time = huge(1.0_wp)
          if (y > -1.0_wp) time = log(1.0_wp + y) / growth
       end if
-      ! Where the velocity changes by much, the slider is to go as far as it can.
+      ! Where the velocity changes much, the slider may move as far as it can.
       if (abs(bend) * min(time, 1.0e100_wp)**2 > 1.0_wp) time = max(time, 1.0_wp / sqrt(abs(bend)))
    end function expected_time
 
-   !> Shorten a step to the first time at which a clock comes to its reading, and let clocks go on.
+   !> Shorten a step to the first time at which a clock reaches its reading, and advance the clocks.
    pure subroutine advance_clocks(clock, series, terms, step, is_ended)
-      !> The clocks
       type(hazard_clock_type), intent(inout) :: clock(clocks)
-      !> Coefficients of the velocity in the time
+      !> Coefficients of the velocity
       real(wp), intent(in) :: series(0:)
       integer, intent(in) :: terms
       !> Length of the step [s]
@@ -113,7 +110,7 @@ contains
       real(wp) :: time
 
       if (terms == 1) then
-         call go_uniformly(clock, series(0), step, ended_by)
+         call advance_uniformly(clock, series(0), step, ended_by)
          is_done = .true.
       else
          call try_series(clock, series, terms, step, ended_by, is_done)
@@ -140,16 +137,14 @@ contains
       is_ended = ended_by > 0
    end subroutine advance_clocks
 
-   !> Time at which a clock comes to its reading; huge if it does not within a step.
+   !> Time from the start of a step at which a clock reaches its reading [s]; huge if it does not.
    pure function time_to_reading(clock, series, terms, step) result(time)
-      !> The clock
       type(hazard_clock_type), intent(in) :: clock
-      !> Coefficients of the velocity in the time
+      !> Coefficients of the velocity
       real(wp), intent(in) :: series(0:)
       integer, intent(in) :: terms
       !> Length of the step [s]
       real(wp), intent(in) :: step
-      !> The time from the start of the step [s]
       real(wp) :: time
 
       type(exponent_type) :: exponent
@@ -180,16 +175,15 @@ contains
       end do
    end function time_to_reading
 
-   !> Integral of exp(slope D(t)) over a step, D being the displacement since its start.
+   !> Integral of exp(slope D(t)) over a step [s], D being the displacement since its start.
    pure function reading_after(slope, series, terms, step) result(reading)
       !> Change of the exponent with the displacement [1/m]
       real(wp), intent(in) :: slope
-      !> Coefficients of the velocity in the time
+      !> Coefficients of the velocity
       real(wp), intent(in) :: series(0:)
       integer, intent(in) :: terms
       !> Length of the step [s]
       real(wp), intent(in) :: step
-      !> The integral [s]
       real(wp) :: reading
 
       type(exponent_type) :: exponent
@@ -226,9 +220,8 @@ contains
       end do
    end subroutine expand_exponent
 
-   !> Make a step at a constant velocity: shorten it to the first time at which a clock comes to its
-   !> reading, and let clocks go on.
-   pure subroutine go_uniformly(clock, velocity, step, ended_by)
+   !> The same at a constant velocity.
+   pure subroutine advance_uniformly(clock, velocity, step, ended_by)
       type(hazard_clock_type), intent(inout) :: clock(clocks)
       real(wp), intent(in) :: velocity
       real(wp), intent(inout) :: step
@@ -257,31 +250,23 @@ contains
          if (clock(number)%is_used .and. number /= ended_by) clock(number)%elapsed = step &
             & * clock(number)%rate * mean_growth(clock(number)%slope * velocity * step)
       end do
-   end subroutine go_uniformly
+   end subroutine advance_uniformly
 
-   !> Parts of a step in each of which the exponent changes so little that a rule is exact.
+   !> Parts of a step in each of which the exponent changes so little that the rule is exact.
    pure function parts_of(exponent, step) result(parts)
       type(exponent_type), intent(in) :: exponent
       real(wp), intent(in) :: step
       integer :: parts
 
-      parts = max(1, ceiling(max_change_until(exponent, step) / max_change))
-   end function parts_of
-
-   !> Bound on the change of the exponent until a time.
-   pure function max_change_until(exponent, time) result(change)
-      type(exponent_type), intent(in) :: exponent
-      real(wp), intent(in) :: time
       real(wp) :: change
-
       integer :: term
 
       change = 0.0_wp
       do term = exponent%terms - 1, 0, -1
-         change = change * time + abs(exponent%mean(term))
+         change = change * step + abs(exponent%mean(term))
       end do
-      change = change * time
-   end function max_change_until
+      parts = max(1, ceiling(change * step / max_change))
+   end function parts_of
 
    !> Integral of the exponential function over a part of a step, relative to its start.
    pure function integral_from(exponent, start, length) result(integral)
@@ -303,7 +288,7 @@ contains
       integral = integral * length
    end function integral_from
 
-   !> Time within a part of a step at which an integral is reached, in a bracket.
+   !> Time within a part of a step at which an integral is reached, by Halley's method in a bracket.
    pure function time_within(exponent, start, length, wanted, whole) result(time)
       type(exponent_type), intent(in) :: exponent
       !> Start and length of the part [s]
@@ -356,7 +341,7 @@ contains
       else if (above > 0.5_wp * huge(1.0_wp)) then
          time = (log(growth) + log(wanted)) / growth
       else if (above > 0.0_wp) then
-         ! W. Kahan: the error of the sum is that of its difference from 1 as well.
+         ! W. Kahan: the rounding of the sum cancels in the quotient.
          time = wanted * (log(above) / (above - 1.0_wp))
       else
          time = huge(1.0_wp)

@@ -1,7 +1,7 @@
-!> Clocks of thermally activated breaking in steps in which their rates are series in the time.
+!> Clocks of thermally activated breaking in steps in which their rates are series in time.
 !>
-!> The exponent of a rate is a polynomial of the time. Where it changes little in a step its
-!> exponential function is a short series, and the time of a reading the reversion of its integral
+!> The exponent of a rate is a polynomial of time. Where it changes little in a step its exponential
+!> function is a short series, and the time of a reading follows from the reversion of the integral
 !> and a step or two of Newton's method.
 module mesoslip_sliders_hazard_series
    use mesoslip_interface_law, only: clocks, hazard_clock_type
@@ -12,16 +12,16 @@ module mesoslip_sliders_hazard_series
 
    public :: try_series
 
-   !> Relative change of a time after which one more step changes nothing
+   !> Relative change of a time after which another iteration changes nothing
    real(wp), parameter :: converged = 1.0e-6_wp
    integer, parameter :: max_iterations = 60
-   !> A step is short if the terms of the exponent, from the first to the fourth, change it by no
-   !> more than this, and others by nothing: what a series of the sixth order leaves out of its
-   !> exponential function is below 1e-15 of it
+   !> A step is short if the first four terms of the exponent change it by no more than this, and
+   !> the others by nothing: the remainder of a series of the sixth order of its exponential
+   !> function is below 1e-15 of it
    integer, parameter :: short_terms = 4, short_order = 6
    real(wp), parameter :: max_short(short_terms) = [2.0e-2_wp, 1.0e-5_wp, 1.0e-7_wp, 1.0e-9_wp]
-   !> A middling step has a longer series, the last coefficients of which show whether it is exact;
-   !> most of them, with a smaller change of the exponent, one of a lower order
+   !> A middling step has a longer series, whose last coefficients show whether it is exact. Most
+   !> change the exponent less, and have one of a lower order
    integer, parameter :: series_order = 14, low_order = 10, tail = 3
    real(wp), parameter :: max_middling = 0.3_wp, max_low = 0.12_wp
    real(wp), parameter :: no_change = 1.0e-16_wp
@@ -35,7 +35,7 @@ module mesoslip_sliders_hazard_series
 contains
 
    !> Try a step in which the exponential function is a series: shorten it to the first time at
-   !> which a clock comes to its reading, and let clocks go on.
+   !> which a clock reaches its reading, and advance the clocks.
    pure subroutine try_series(clock, series, terms, step, ended_by, is_done)
       type(hazard_clock_type), intent(inout) :: clock(clocks)
       real(wp), intent(in) :: series(0:)
@@ -68,7 +68,7 @@ contains
          is_short = change * abs(length) <= no_change
       end if
       if (is_short) then
-         call go_short(clock, short, step, ended_by)
+         call advance_short(clock, short, step, ended_by)
          is_done = .true.
          return
       end if
@@ -83,16 +83,15 @@ contains
       exponent(terms + 1:middling_terms) = 0.0_wp
       ! The order is a constant in each call: the compiler makes a copy for each.
       is_done = change <= max_low
-      if (is_done) call go_middling(clock, exponent, low_order, max_low_tail, step, ended_by, &
+      if (is_done) call advance_middling(clock, exponent, low_order, max_low_tail, step, ended_by, &
          & is_done)
       if (is_done) return
       is_done = change <= max_middling
-      if (is_done) call go_middling(clock, exponent, series_order, max_tail, step, ended_by, &
+      if (is_done) call advance_middling(clock, exponent, series_order, max_tail, step, ended_by, &
          & is_done)
    end subroutine try_series
 
-   !> Make a short step.
-   pure subroutine go_short(clock, exponent, step, ended_by)
+   pure subroutine advance_short(clock, exponent, step, ended_by)
       type(hazard_clock_type), intent(inout) :: clock(clocks)
       !> The exponent of the first clock, over a step of length 1
       real(wp), intent(in) :: exponent(short_terms)
@@ -119,10 +118,10 @@ contains
             & = clock(number)%rate * step * (time * horner(mean(:, number), short_order + 1, time))
       end do
       if (ended_by > 0) step = time * step
-   end subroutine go_short
+   end subroutine advance_short
 
-   !> Make a middling step, unless the series does not converge.
-   pure subroutine go_middling(clock, exponent, order, max_last, step, ended_by, is_done)
+   !> Advance by a middling step, unless the series does not converge.
+   pure subroutine advance_middling(clock, exponent, order, max_last, step, ended_by, is_done)
       type(hazard_clock_type), intent(inout) :: clock(clocks)
       !> The exponent of the first clock, over a step of length 1
       real(wp), intent(in) :: exponent(max_terms)
@@ -131,7 +130,7 @@ contains
       real(wp), intent(in) :: max_last(tail)
       real(wp), intent(inout) :: step
       integer, intent(out) :: ended_by
-      !> Whether it was made; if not, nothing has changed
+      !> Whether it converges; if not, nothing has changed
       logical, intent(out) :: is_done
 
       real(wp) :: time, part, direction, mean(0:series_order, clocks)
@@ -164,7 +163,7 @@ contains
             & = clock(number)%rate * step * (time * horner(mean(:, number), order + 1, time))
       end do
       if (ended_by > 0) step = time * step
-   end subroutine go_middling
+   end subroutine advance_middling
 
    !> Coefficients of the mean of the exponential function since the start of a short step, side by
    !> side: exp(e_1 t) times the same of the other terms.
@@ -246,12 +245,10 @@ contains
       end do
    end function long_means
 
-   !> Time at which a clock comes to its reading, in units of the step; huge if it is later than a
-   !> time.
+   !> Time at which a clock reaches its reading, in units of the step; huge if later than a bound.
    pure function time_of(mean, order, left, whole, latest) result(time)
-      !> Coefficients of the mean of the exponential function
+      !> Coefficients of the mean of the exponential function, and their order
       real(wp), intent(in) :: mean(0:)
-      !> The last of them
       integer, intent(in) :: order
       !> The remaining deviate, and the advance of the clock in the step at its first rate
       real(wp), intent(in) :: left, whole

@@ -21,24 +21,23 @@ module mesoslip_sliders_layered
    use mesoslip_sliders_layered_integrator, only: integrator_type
    use mesoslip_sliders_layered_system, only: fastest_rate, layered_parameters_type, new_system, &
       & solver_codes, solver_names, solver_series, system_type
-   use mesoslip_sliders_motion_series, only: first_end, horner, inverse, max_terms
+   use mesoslip_sliders_motion_series, only: first_end, horner, inverse, max_terms, slope
    implicit none
    private
 
-   public :: slider_layered_type, layered_parameters_type, new_slider_layered, make_slider_layered
+   public :: slider_layered_type, make_slider_layered
 
    !> Maximum duration of a step in units of the fastest rate
    real(wp), parameter :: max_step = 2.5_wp
    !> Minimum number of terms
    integer, parameter :: min_terms = 4
-   !> Layers whose series take as long as an advance of a rigid slider
+   !> Number of layers whose series take as long as an advance of a rigid slider
    real(wp), parameter :: layers_per_cost = 4.0_wp
-   !> Points of the rule by which losses are integrated
+   !> Points of the rule for the losses of a step
    integer, parameter :: points = 12
 
    !> An elastic slider.
    type, extends(slider_type) :: slider_layered_type
-      !> Parameters of the slider
       type(layered_parameters_type) :: parameters
       !> The system during the last advance
       type(system_type), pointer, private :: system => null()
@@ -65,84 +64,66 @@ module mesoslip_sliders_layered
       procedure :: energy
       procedure :: shift_origin
       procedure :: exchange
-      procedure, non_overridable, private :: take_law, expand_motion, integrate, find_end, &
-         & move_to, add_work, add_losses, copy_drive
+      procedure, non_overridable, private :: take_law, expand_motion, find_end, move_to, add_work, &
+         & add_losses
       final :: close
    end type slider_layered_type
 
 contains
 
-   !> Set up an elastic slider from named numbers.
+   !> Set up an elastic slider from named numbers; mass 0 of the base: no base.
    subroutine make_slider_layered(slider, parameters, error)
-      !> The slider
       class(slider_type), allocatable, intent(out) :: slider
-      !> Parameters of the slider; a base of mass zero is none
       type(parameters_type), intent(inout) :: parameters
-      !> Set if a number is missing or superfluous
       type(error_type), allocatable, intent(inout) :: error
 
       type(slider_layered_type), allocatable :: self
-      type(layered_parameters_type) :: values
-      integer :: solver
+      integer :: solver, term, stat
 
-      call parameters%take("layers", values%layers, error)
-      call parameters%take("mass", values%mass, error)
-      call parameters%take("stiffness", values%stiffness, error)
-      call parameters%take("damping", values%damping, error)
-      call parameters%take("base_mass", values%base_mass, error)
-      call parameters%take("base_stiffness", values%base_stiffness, error)
-      call parameters%take("base_damping", values%base_damping, error)
-      call parameters%take("solver", solver_names, solver, error)
-      call parameters%take("relative_tolerance", values%relative, error)
-      call parameters%take("absolute_tolerance", values%absolute, error)
-      call parameters%finish(error)
-      if (allocated(error)) return
-      values%solver = solver_codes(solver)
       allocate (self)
-      call new_slider_layered(self, values, error)
-      call move_alloc(self, slider)
-   end subroutine make_slider_layered
+      associate (values => self%parameters)
+         call parameters%take("layers", values%layers, error)
+         call parameters%take("mass", values%mass, error)
+         call parameters%take("stiffness", values%stiffness, error)
+         call parameters%take("damping", values%damping, error)
+         call parameters%take("base_mass", values%base_mass, error)
+         call parameters%take("base_stiffness", values%base_stiffness, error)
+         call parameters%take("base_damping", values%base_damping, error)
+         call parameters%take("solver", solver_names, solver, error)
+         call parameters%take("relative_tolerance", values%relative, error)
+         call parameters%take("absolute_tolerance", values%absolute, error)
+         call parameters%finish(error)
+         if (allocated(error)) return
+         values%solver = solver_codes(solver)
 
-   !> Set up an elastic slider.
-   subroutine new_slider_layered(self, parameters, error)
-      !> The slider
-      type(slider_layered_type), intent(inout) :: self
-      !> Parameters of the slider
-      type(layered_parameters_type), intent(in) :: parameters
-      !> Set if there is not enough memory
-      type(error_type), allocatable, intent(inout) :: error
-
-      integer :: term, stat
-
-      self%parameters = parameters
-      self%cost = 1.0_wp + parameters%layers / layers_per_cost
-      allocate (self%state(0:parameters%layers, 2), source=0.0_wp, stat=stat)
-      if (stat == 0) then
-         allocate (self%series(0:parameters%layers, 2, 0:max_terms), source=0.0_wp, stat=stat)
-      end if
-      if (stat /= 0) then
-         call raise(error, status_memory, "not enough memory for the layers")
-         return
-      end if
+         allocate (self%state(0:values%layers, 2), source=0.0_wp, stat=stat)
+         if (stat == 0) then
+            allocate (self%series(0:values%layers, 2, 0:max_terms), source=0.0_wp, stat=stat)
+         end if
+         if (stat /= 0) then
+            call raise(error, status_memory, "not enough memory for the layers")
+            return
+         end if
+         self%cost = 1.0_wp + values%layers / layers_per_cost
+         self%has_passages = .true.
+         self%own_rate = sqrt(values%stiffness / values%mass)
+         allocate (self%system)
+         self%system = new_system(values)
+         self%inverse_mass = 1.0_wp / self%system%layer_mass
+         if (values%base_mass > 0.0_wp) then
+            self%inverse_mass = self%inverse_mass + 1.0_wp / values%base_mass
+         end if
+      end associate
       call gauss_legendre(self%point, self%weight)
-      ! The first term left out is below 1e-17 of what a free motion has.
+      ! The first term left out is below 1e-17 of a free motion.
       do term = 1, max_terms
          self%reach(term) = exp((log(1.0e-17_wp) + log_gamma(term + 1.0_wp)) / term)
       end do
-      allocate (self%system)
-      self%system = new_system(parameters)
-      self%inverse_mass = 1.0_wp / self%system%layer_mass
-      if (parameters%base_mass > 0.0_wp) then
-         self%inverse_mass = self%inverse_mass + 1.0_wp / parameters%base_mass
-      end if
-      self%own_rate = sqrt(parameters%stiffness / parameters%mass)
-   end subroutine new_slider_layered
+      call move_alloc(self, slider)
+   end subroutine make_slider_layered
 
-   !> Put the slider at rest in balance with the contacts.
    subroutine start(self, law)
-      !> The slider, its displacement zero
       class(slider_layered_type), intent(inout) :: self
-      !> Contact force at the start
       type(interface_law_type), intent(in) :: law
 
       real(wp) :: force
@@ -163,51 +144,31 @@ contains
       self%system%law = law
    end subroutine start
 
-   !> Take note that the drive has changed: CVODE restarts.
+   !> CVODE restarts.
    subroutine adapt_to_drive(self)
-      !> The slider
       class(slider_layered_type), intent(inout) :: self
 
       self%integrator%is_stale = .true.
    end subroutine adapt_to_drive
 
-   !> Whether a run that is put away now goes on to the bit: the history of CVODE cannot be put
-   !> away, so only where it restarts.
+   !> The history of CVODE cannot be saved: only where it restarts.
    pure function can_pause(self)
-      !> The slider
       class(slider_layered_type), intent(in) :: self
-      !> Whether it does
       logical :: can_pause
 
       can_pause = self%integrator%is_stale .or. self%parameters%solver == solver_series
    end function can_pause
 
-   !> Velocity, at the end of the last advance, of the layer that the drive's spring pulls.
    pure function pulled_velocity(self) result(velocity)
-      !> The slider
       class(slider_layered_type), intent(in) :: self
-      !> Velocity [m/s]
       real(wp) :: velocity
 
       velocity = self%state(self%parameters%layers, 2)
    end function pulled_velocity
 
-   !> Copy the drive as it is now into the system.
-   subroutine copy_drive(self)
-      class(slider_layered_type), intent(inout) :: self
-
-      self%system%drive = self%drive%at(self%time)
-      self%system%drive_velocity = self%drive%rate_at(self%time)
-      self%system%drive_acceleration = self%drive%acceleration
-   end subroutine copy_drive
-
-   !> Move until the first end of a window, or less far.
    subroutine advance(self, law, window)
-      !> The slider
       class(slider_layered_type), intent(inout) :: self
-      !> Contact force
       type(interface_law_type), intent(in) :: law
-      !> Where the law holds
       type(window_type), intent(in) :: window
 
       type(window_type) :: bounds
@@ -226,10 +187,16 @@ contains
          return
       end if
 
+      if (self%parameters%solver == solver_series .or. self%integrator%is_stale) then
+         self%system%drive = self%drive%at(self%time)
+         self%system%drive_velocity = self%drive%rate_at(self%time)
+         self%system%drive_acceleration = self%drive%acceleration
+      end if
       if (self%parameters%solver == solver_series) then
          call self%expand_motion(bounds, step, ends)
       else
-         call self%integrate(bounds%end_time, step, ends)
+         call self%integrator%step(self%system, self%state, self%time, bounds%end_time, &
+            & self%terms, self%series, step, ends, self%failure)
          if (allocated(self%failure)) return
       end if
       longest = step
@@ -253,7 +220,7 @@ contains
       end if
    end subroutine advance
 
-   !> Take the law of the contact force; CVODE restarts if it is another one.
+   !> Take the law of the contact force; CVODE restarts if it differs.
    subroutine take_law(self, law)
       class(slider_layered_type), intent(inout) :: self
       type(interface_law_type), intent(in) :: law
@@ -267,23 +234,22 @@ contains
       self%system%law = law
    end subroutine take_law
 
-   !> The motion as a series, over a step that it is exact in.
+   !> The motion as a series, over a step in which it is exact.
    subroutine expand_motion(self, window, step, ends)
       class(slider_layered_type), intent(inout) :: self
       type(window_type), intent(in) :: window
       !> Length of the step, at first up to the end of the window
       real(wp), intent(inout) :: step
-      !> Whether it comes to that end
+      !> Whether it reaches that end
       logical, intent(out) :: ends
 
       real(wp) :: rate, gap
       integer :: term
 
-      call self%copy_drive()
       rate = fastest_rate(self%system)
       ends = step * rate <= max_step
       if (.not. ends) step = max_step / rate
-      ! Most steps end at a break: no need for a series that reaches farther.
+      ! Most steps end at a break: a longer series is not needed.
       if (self%velocity > 0.0_wp) then
          gap = window%upper - self%displacement
       else
@@ -303,21 +269,6 @@ contains
       end do
       call expand(self%system, self%state, self%terms, self%series)
    end subroutine expand_motion
-
-   !> A step of CVODE, as a series.
-   subroutine integrate(self, end_time, step, ends)
-      class(slider_layered_type), intent(inout) :: self
-      !> Time that must not be passed [s]
-      real(wp), intent(in) :: end_time
-      !> Length of the step
-      real(wp), intent(out) :: step
-      !> Whether it comes to that time
-      logical, intent(out) :: ends
-
-      if (self%integrator%is_stale) call self%copy_drive()
-      call self%integrator%step(self%system, self%state, self%time, end_time, self%terms, &
-         & self%series, step, ends, self%failure)
-   end subroutine integrate
 
    !> Shorten a step to the first time at which layer 1 leaves a window or turns round.
    subroutine find_end(self, window, step, crosses, turns, direction)
@@ -354,7 +305,7 @@ contains
    subroutine move_to(self, step, crosses, turns, target)
       class(slider_layered_type), intent(inout) :: self
       real(wp), intent(in) :: step
-      !> Whether an end of the window is there, or a turning point
+      !> Whether this is an end of the window, or a turning point
       logical, intent(in) :: crosses, turns
       !> Displacement of that end [m]
       real(wp), intent(in) :: target
@@ -438,13 +389,10 @@ contains
       call self%damping_loss%add(damped)
    end subroutine add_losses
 
-   !> The motion at a time of the last advance.
+   !> The motion is that of layer 1 relative to the base.
    pure function observe(self, time) result(motion)
-      !> The slider
       class(slider_layered_type), intent(in) :: self
-      !> Time [s]
       real(wp), intent(in) :: time
-      !> The motion, that of layer 1 relative to the base
       type(motion_type) :: motion
 
       real(wp) :: step, drive, first, last, base, first_velocity
@@ -453,7 +401,7 @@ contains
       layers = self%parameters%layers
       step = time - self%step_time
       drive = self%drive%at(time)
-      ! All of them term by term: they do not wait for each other.
+      ! Side by side, term by term: these sums do not wait for each other.
       base = 0.0_wp
       first = 0.0_wp
       last = 0.0_wp
@@ -479,13 +427,9 @@ contains
          & + self%system%law%drag * motion%velocity + self%system%law%rate * step
    end function observe
 
-   !> Displacements of the layers at a time of the last advance.
    pure subroutine observe_layers(self, time, displacement)
-      !> The slider
       class(slider_layered_type), intent(in) :: self
-      !> Time [s]
       real(wp), intent(in) :: time
-      !> Absolute displacements, shape (layers) [m]
       real(wp), intent(out) :: displacement(:)
 
       integer :: term
@@ -497,11 +441,8 @@ contains
       displacement = self%origin + displacement
    end subroutine observe_layers
 
-   !> Kinetic energy and that of all springs.
    pure function energy(self)
-      !> The slider
       class(slider_layered_type), intent(in) :: self
-      !> Energy [J]
       real(wp) :: energy
 
       integer :: last
@@ -516,11 +457,9 @@ contains
       end associate
    end function energy
 
-   !> Move the origin of displacements; the base keeps its own.
+   !> The base keeps its origin; CVODE restarts.
    subroutine shift_origin(self, shift)
-      !> The slider
       class(slider_layered_type), intent(inout) :: self
-      !> Displacement of the new origin [m]
       real(wp), intent(in) :: shift
 
       call shift_slider(self, shift)
@@ -528,23 +467,17 @@ contains
       self%integrator%is_stale = .true.
    end subroutine shift_origin
 
-   !> Free what the slider holds.
    subroutine close(self)
-      !> The slider
       type(slider_layered_type), intent(inout) :: self
 
       call self%integrator%close()
       if (associated(self%system)) deallocate (self%system)
    end subroutine close
 
-   !> Put the state into an archive or take it out; CVODE restarts.
+   !> CVODE restarts.
    subroutine exchange(self, archive)
-      !> The slider
       class(slider_layered_type), intent(inout) :: self
-      !> The archive
       type(archive_type), intent(inout) :: archive
-
-      real(wp), allocatable :: state(:, :)
 
       call archive%section("layered slider")
       call exchange_slider(self, archive)
@@ -552,10 +485,8 @@ contains
       call archive%exchange("drive", self%system%drive)
       call archive%exchange("drive_velocity", self%system%drive_velocity)
       call archive%exchange("drive_acceleration", self%system%drive_acceleration)
-      state = self%state
-      call archive%exchange("state", state)
-      if (all(shape(state) == shape(self%state))) self%state = state
-      call archive%exchange("series", self%series)
+      call archive%exchange_fixed("state", shape(self%state), self%state)
+      call archive%exchange_fixed("series", [size(self%state), max_terms + 1], self%series)
       call archive%exchange("terms", self%terms)
       call archive%exchange("steps", self%integrator_counts(1))
       call archive%exchange("evaluations", self%integrator_counts(2))
@@ -563,19 +494,5 @@ contains
       if (archive%saving) return
       call self%integrator%reset(self%integrator_counts)
    end subroutine exchange
-
-   !> Derivative of a series.
-   pure function slope(series, terms, time)
-      real(wp), intent(in) :: series(0:), time
-      integer, intent(in) :: terms
-      real(wp) :: slope
-
-      integer :: term
-
-      slope = 0.0_wp
-      do term = terms - 1, 1, -1
-         slope = slope * time + term * series(term)
-      end do
-   end function slope
 
 end module mesoslip_sliders_layered

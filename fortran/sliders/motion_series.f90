@@ -1,4 +1,4 @@
-!> Motions as power series of the velocity in time: values, displacements, and when they end.
+!> Motions as power series of the velocity in time: values, displacements, ends of steps.
 !>
 !> The number of terms is a constant in most calls, so that link-time optimization makes copies for
 !> the numbers of terms in use: a quarter of the time of an event depends on it.
@@ -7,14 +7,19 @@ module mesoslip_sliders_motion_series
    implicit none
    private
 
-   public :: max_terms, inverse
-   public :: first_end, horner, integral, second_integral, lever
+   public :: max_terms, inverse, rounding, long_time
+   public :: first_end, horner, slope, integral, second_integral, lever
 
    !> Maximum number of terms
    integer, parameter :: max_terms = 28
    !> Reciprocals of the natural numbers
    integer :: i
    real(wp), parameter :: inverse(max_terms + 2) = [(1.0_wp / i, i=1, max_terms + 2)]
+   !> Forces whose relative difference is smaller are equal up to rounding
+   real(wp), parameter :: rounding = 16.0_wp * epsilon(1.0_wp)
+   !> Duration of a step, in radians of an oscillation, from which an oscillation below the
+   !> resolution of the contact force is ignored
+   real(wp), parameter :: long_time = 2.0_wp
 
 contains
 
@@ -27,7 +32,6 @@ contains
       real(wp), intent(in) :: above, below
       !> Bound on the change of the velocity in the whole step
       real(wp), intent(in) :: change
-      !> Length of the step
       real(wp), intent(inout) :: step
       !> Whether it ends at an end of the window, or at a turning point
       logical, intent(out) :: crosses, turns
@@ -104,13 +108,13 @@ contains
       leads = abs(series(0)) > rest
    end function leads
 
-   !> Time at which a motion in one direction has made a displacement, by Halley's method in a
+   !> Time at which a motion in one direction reaches a displacement, by Halley's method in a
    !> bracket.
    pure function crossing(series, terms, distance, longest) result(time)
       !> Coefficients of the velocity
       real(wp), intent(in) :: series(0:)
       integer, intent(in) :: terms
-      !> Displacement, which is made at the longest time or before
+      !> Displacement, which is reached at the longest time or before
       real(wp), intent(in) :: distance, longest
       real(wp) :: time
 
@@ -143,7 +147,7 @@ contains
          if (next > lower .and. next < upper) then
             change = next - time
             time = next
-            ! Convergence is cubic: the next change would be lost in rounding.
+            ! Convergence is cubic: the next change would be below rounding.
             if (abs(change) <= converged * next) exit
          else
             if (upper - lower <= spacing(upper) .or. abs(excess) <= 0.0_wp) exit
@@ -203,6 +207,20 @@ contains
       end do
       value = even + time * odd
    end function horner
+
+   !> Derivative of a series.
+   pure function slope(series, terms, time)
+      real(wp), intent(in) :: series(0:), time
+      integer, intent(in) :: terms
+      real(wp) :: slope
+
+      integer :: term
+
+      slope = 0.0_wp
+      do term = terms - 1, 1, -1
+         slope = slope * time + term * series(term)
+      end do
+   end function slope
 
    !> Integral of a series from zero.
    pure function integral(series, terms, time) result(value)

@@ -1,4 +1,4 @@
-!> A slider that goes exactly where the drive goes: a velocity-controlled block, K = infinity.
+!> A slider that moves exactly as the drive does: a velocity-controlled block, K = infinity.
 module mesoslip_sliders_prescribed
    use mesoslip_numerics_archive, only: archive_type
    use mesoslip_numerics_kinds, only: wp
@@ -22,8 +22,6 @@ module mesoslip_sliders_prescribed
       type(interface_law_type), private :: law
    contains
       procedure :: adapt_to_drive
-      procedure :: note_extreme
-      procedure :: select_extremes
       procedure :: start
       procedure :: advance
       procedure :: run_ahead
@@ -35,13 +33,10 @@ module mesoslip_sliders_prescribed
 
 contains
 
-   !> Set up a slider that goes where the drive goes from named numbers.
+   !> Set up a prescribed slider, which has no parameters.
    subroutine make_slider_prescribed(slider, parameters, error)
-      !> The slider
       class(slider_type), allocatable, intent(out) :: slider
-      !> No numbers
       type(parameters_type), intent(inout) :: parameters
-      !> Set if a number is missing or superfluous
       type(error_type), allocatable, intent(inout) :: error
 
       type(slider_prescribed_type), allocatable :: self
@@ -53,9 +48,8 @@ contains
       call move_alloc(self, slider)
    end subroutine make_slider_prescribed
 
-   !> Take velocity and acceleration of the drive, which the slider has at once.
+   !> The slider has velocity and acceleration of the drive at once.
    subroutine adapt_to_drive(self)
-      !> The slider
       class(slider_prescribed_type), intent(inout) :: self
 
       self%velocity = self%drive%rate
@@ -63,27 +57,9 @@ contains
       if (abs(self%velocity) > 0.0_wp) self%direction = sign(1.0_wp, self%velocity)
    end subroutine adapt_to_drive
 
-   !> The contact force jumps: extremes are noted in each step.
-   subroutine note_extreme(self)
-      !> The slider
-      class(slider_prescribed_type), intent(inout) :: self
-
-   end subroutine note_extreme
-
-   !> No step is needed for extremes.
-   pure subroutine select_extremes(self, filter)
-      !> The slider
-      class(slider_prescribed_type), intent(in) :: self
-      !> The filter
-      type(step_filter_type), intent(inout) :: filter
-
-   end subroutine select_extremes
-
-   !> Put the slider where the drive is, moving with it.
+   !> The slider starts with the velocity of the drive.
    subroutine start(self, law)
-      !> The slider, its displacement zero
       class(slider_prescribed_type), intent(inout) :: self
-      !> Contact force at the start
       type(interface_law_type), intent(in) :: law
 
       self%law = law
@@ -91,30 +67,21 @@ contains
       self%velocity = self%drive%rate
    end subroutine start
 
-   !> Move until the first end of a window.
    subroutine advance(self, law, window)
-      !> The slider
       class(slider_prescribed_type), intent(inout) :: self
-      !> Contact force
       type(interface_law_type), intent(in) :: law
-      !> Where the law holds
       type(window_type), intent(in) :: window
 
       if (abs(self%drive%acceleration) > 0.0_wp) then
-         call speed_up(self, law, window)
+         call accelerate(self, law, window)
       else
-         call step_on(self, law, window)
+         call move_uniformly(self, law, window)
       end if
    end subroutine advance
 
-   !> Move through a schedule until it ends, or until a step is of interest; the drive has no
-   !> acceleration.
    subroutine run_ahead(self, schedule, filter)
-      !> The slider
       class(slider_prescribed_type), intent(inout) :: self
-      !> Coming changes of the contact force
       type(schedule_type), intent(inout) :: schedule
-      !> Which steps are of interest; the slider stops after one
       type(step_filter_type), intent(inout) :: filter
 
       self%has_clocks = schedule%has_clocks
@@ -122,7 +89,7 @@ contains
          if (schedule%has_clocks) then
             call schedule%hazard%offer(self%displacement, self%clock)
          end if
-         call step_on(self, schedule%law(), schedule%window(self%time))
+         call move_uniformly(self, schedule%law(), schedule%window(self%time))
          if (schedule%has_clocks) call schedule%hazard%advance(self%clock)
          call filter%examine(self%time, self%velocity, self%start_acceleration, self%acceleration)
          if (filter%is_selected .or. self%direction * schedule%direction < 0.0_wp) return
@@ -132,7 +99,7 @@ contains
    end subroutine run_ahead
 
    !> One step at a constant velocity.
-   pure subroutine step_on(self, law, window)
+   pure subroutine move_uniformly(self, law, window)
       type(slider_prescribed_type), intent(inout) :: self
       type(interface_law_type), intent(in) :: law
       type(window_type), intent(in) :: window
@@ -170,10 +137,10 @@ contains
          call note(self, self%step_time, start, self%velocity)
          call note(self, self%time, self%displacement, self%velocity)
       end if
-   end subroutine step_on
+   end subroutine move_uniformly
 
    !> One step while the drive has an acceleration, in which it does not turn round.
-   pure subroutine speed_up(self, law, window)
+   pure subroutine accelerate(self, law, window)
       type(slider_prescribed_type), intent(inout) :: self
       type(interface_law_type), intent(in) :: law
       type(window_type), intent(in) :: window
@@ -193,7 +160,7 @@ contains
          distance = limit - self%drive%value
          late = self%drive%direction * sqrt(max(0.0_wp, &
             & self%drive%rate**2 + 2.0_wp * self%drive%acceleration * distance))
-         ! Of two forms of the root the one in which nothing cancels.
+         ! The form of the root in which nothing cancels.
          pace = self%drive%rate + late
          if (self%drive%direction * self%drive%rate < 0.0_wp) then
             time = (late - self%drive%rate) / self%drive%acceleration
@@ -228,7 +195,7 @@ contains
       call note(self, self%step_time, start, early)
       call note(self, self%time, self%displacement, late)
       if (abs(law%stiffness) > 0.0_wp) then
-         ! Where contacts pull more by as much as drag pulls less.
+         ! The force of the contacts grows as fast as drag and rate decrease there.
          time = -(law%drag + law%rate / self%drive%acceleration) / law%stiffness &
             & - early / self%drive%acceleration
          if (time > 0.0_wp .and. time < step) call note(self, self%step_time + time, start + time &
@@ -243,11 +210,10 @@ contains
          square = step * (early**2 + early * late + late**2) / 3.0_wp
       end function square
 
-   end subroutine speed_up
+   end subroutine accelerate
 
-   !> Let a step end where a clock comes to its reading.
+   !> End a step where a clock reaches its reading.
    pure subroutine end_at_clock(self)
-      !> The slider at the end of the step, its velocity being that at the start
       type(slider_prescribed_type), intent(inout) :: self
 
       real(wp) :: step
@@ -261,10 +227,9 @@ contains
       self%displacement = self%drive%at(self%time)
    end subroutine end_at_clock
 
-   !> Note the contact force at a place in the last step.
+   !> Note the contact force at a time of the last step, for its extremes.
    pure subroutine note(self, time, displacement, velocity)
       type(slider_prescribed_type), intent(inout) :: self
-      !> Time [s], displacement [m] and velocity [m/s]
       real(wp), intent(in) :: time, displacement, velocity
 
       call self%drive%extremes%note(self%law%stiffness * displacement - self%law%offset &
@@ -272,13 +237,9 @@ contains
          & self%origin + displacement)
    end subroutine note
 
-   !> The motion at a time of the last advance.
    pure function observe(self, time) result(motion)
-      !> The slider
       class(slider_prescribed_type), intent(in) :: self
-      !> Time [s]
       real(wp), intent(in) :: time
-      !> The motion
       type(motion_type) :: motion
 
       real(wp) :: displacement
@@ -294,32 +255,24 @@ contains
       motion%spring_force = motion%contact_force
    end function observe
 
-   !> A massless slider without a spring has no energy.
+   !> The slider has neither mass nor spring.
    pure function energy(self)
-      !> The slider
       class(slider_prescribed_type), intent(in) :: self
-      !> Energy [J]
       real(wp) :: energy
 
       energy = 0.0_wp
    end function energy
 
-   !> Move the origin of displacements.
    subroutine shift_origin(self, shift)
-      !> The slider
       class(slider_prescribed_type), intent(inout) :: self
-      !> Displacement of the new origin [m]
       real(wp), intent(in) :: shift
 
       call shift_slider(self, shift)
       call shift_law(self%law, shift)
    end subroutine shift_origin
 
-   !> Put the state into an archive or take it out.
    subroutine exchange(self, archive)
-      !> The slider
       class(slider_prescribed_type), intent(inout) :: self
-      !> The archive
       type(archive_type), intent(inout) :: archive
 
       call archive%section("prescribed slider")

@@ -1,8 +1,8 @@
 !> A slider without inertia that follows the stable equilibrium of spring and contacts.
 !>
-!> Under a linear law of the contact force the equilibrium is one division away. Where contacts have
-!> changed since, the slider jumps to it, or to the first contact before it, while the drive
-!> stands still; then it goes with the drive, which moves the end of the spring.
+!> Under a linear law of the contact force the equilibrium is one division. After a change of
+!> contacts the slider jumps to it, or to the first contact before it, while the drive stands still;
+!> then it moves with the drive, which moves the end of the spring.
 module mesoslip_sliders_quasistatic
    use mesoslip_interface_law, only: interface_law_type, window_type
    use mesoslip_numerics_archive, only: archive_type
@@ -15,9 +15,9 @@ module mesoslip_sliders_quasistatic
    implicit none
    private
 
-   public :: slider_quasistatic_type, make_slider_quasistatic, observe_quasistatic
+   public :: slider_quasistatic_type, make_slider_quasistatic
 
-   !> A contact farther away than this is none [m].
+   !> Contacts farther away are ignored [m].
    real(wp), parameter :: max_distance = 1.0e150_wp
 
    !> A slider in equilibrium.
@@ -32,29 +32,22 @@ module mesoslip_sliders_quasistatic
    contains
       procedure :: start
       procedure :: advance
-      procedure :: observe => observe_quasistatic
+      procedure :: observe
       procedure :: energy
       procedure :: shift_origin
       procedure :: exchange
-      !> Force of the drive on the slider at displacement 0
       procedure, non_overridable :: pull
-      !> Value of the drive that pulls with a force
-      procedure :: value_of_pull
-      !> Add to the work and the impulse of the drive what a jump and a motion add
       procedure :: add_jump
       procedure :: add_motion
-      procedure, non_overridable, private :: jump, go_with_drive
+      procedure, non_overridable, private :: jump, follow_drive
    end type slider_quasistatic_type
 
 contains
 
    !> Set up a slider in equilibrium from named numbers.
    subroutine make_slider_quasistatic(slider, parameters, error)
-      !> The slider
       class(slider_type), allocatable, intent(out) :: slider
-      !> Stiffness of the drive's spring
       type(parameters_type), intent(inout) :: parameters
-      !> Set if a number is missing or superfluous
       type(error_type), allocatable, intent(inout) :: error
 
       type(slider_quasistatic_type), allocatable :: self
@@ -67,25 +60,20 @@ contains
       call move_alloc(self, slider)
    end subroutine make_slider_quasistatic
 
-   !> Put the slider in balance with the contacts.
    subroutine start(self, law)
-      !> The slider, its displacement zero
       class(slider_quasistatic_type), intent(inout) :: self
-      !> Contact force at the start
       type(interface_law_type), intent(in) :: law
 
       self%law = law
-      self%drive%value = self%value_of_pull(law%stiffness * self%displacement - law%offset)
+      self%drive%value = self%displacement &
+         & + (law%stiffness * self%displacement - law%offset) / self%pull_over_value
       self%rest_displacement = self%displacement
    end subroutine start
 
-   !> Jump to equilibrium or to the first contact before it; then move until the window's end.
+   !> Jump to the equilibrium or to the first contact before it; then move until the window's end.
    subroutine advance(self, law, window)
-      !> The slider
       class(slider_quasistatic_type), intent(inout) :: self
-      !> Contact force
       type(interface_law_type), intent(in) :: law
-      !> Where the law holds
       type(window_type), intent(in) :: window
 
       real(wp) :: pull, start
@@ -104,15 +92,15 @@ contains
       call self%jump(window, pull)
       call note(self, pull)
       if (.not. self%is_settled) return
-      ! Clocks stand still in a jump, and go on at another rate.
+      ! Clocks stand still in a jump, and have another rate after it.
       if (self%has_clocks) then
          self%clock%rate = self%clock%rate * exp(self%clock%slope * (self%displacement - start))
       end if
-      call self%go_with_drive(window)
+      call self%follow_drive(window)
       call note(self, self%pull(self%time))
    end subroutine advance
 
-   !> Jump to equilibrium or to the first contact before it.
+   !> Jump to the equilibrium or to the first contact before it.
    subroutine jump(self, window, pull)
       class(slider_quasistatic_type), intent(inout) :: self
       type(window_type), intent(in) :: window
@@ -133,8 +121,8 @@ contains
       call self%add_jump(distance, pull)
    end subroutine jump
 
-   !> Go with the drive from the equilibrium until the window's end.
-   subroutine go_with_drive(self, window)
+   !> Move with the drive from the equilibrium until the window's end.
+   subroutine follow_drive(self, window)
       class(slider_quasistatic_type), intent(inout) :: self
       type(window_type), intent(in) :: window
 
@@ -156,7 +144,7 @@ contains
       else
          self%time = window%end_time
          self%displacement = (self%pull(self%time) + self%law%offset) / stiffness
-         ! Rounding may take it to the other side of a contact that is about to break.
+         ! Rounding could take it beyond a contact that is about to break.
          self%displacement = min(max(self%displacement, lower), upper)
       end if
       step = self%time - self%step_time
@@ -176,20 +164,19 @@ contains
       if (abs(self%acceleration) > 0.0_wp) then
          self%velocity = self%velocity + self%acceleration * step
       end if
-   end subroutine go_with_drive
+   end subroutine follow_drive
 
-   !> A spring whose end stands still has no work done on it in a jump.
+   !> Add the work of the drive in a jump to the energy balance: that of a spring whose end stands
+   !> still is zero.
    subroutine add_jump(self, distance, pull)
-      !> The slider
       class(slider_quasistatic_type), intent(inout) :: self
       !> Displacement in the jump [m], and force of the drive at displacement 0 [N]
       real(wp), intent(in) :: distance, pull
 
    end subroutine add_jump
 
-   !> Add the work and the impulse of the drive in the motion of the last advance.
+   !> Add work and impulse of the drive in the motion of the last advance to the energy balance.
    subroutine add_motion(self, step, distance)
-      !> The slider, its velocity being that at the start of the motion
       class(slider_quasistatic_type), intent(inout) :: self
       !> Duration [s] and displacement [m] of the motion
       real(wp), intent(in) :: step, distance
@@ -210,7 +197,7 @@ contains
       end associate
    end subroutine add_motion
 
-   !> Duration of a displacement without a turn; huge if the motion does not come there.
+   !> Duration of a displacement without a turn; huge if the motion does not reach it.
    pure function time_of(distance, velocity, acceleration) result(time)
       !> Displacement [m], velocity at first [m/s], acceleration [m/s2]
       real(wp), intent(in) :: distance, velocity, acceleration
@@ -243,37 +230,19 @@ contains
          & self%origin + self%displacement)
    end subroutine note
 
-   !> Force of the drive on the slider at displacement 0.
+   !> Force of the drive on the slider at displacement 0 [N].
    pure function pull(self, time) result(force)
-      !> The slider
       class(slider_quasistatic_type), intent(in) :: self
       !> Time [s]
       real(wp), intent(in) :: time
-      !> Force [N]
       real(wp) :: force
 
       force = self%drive%at(time) * self%pull_over_value
    end function pull
 
-   !> Value of the drive that pulls with a force.
-   pure function value_of_pull(self, force) result(value)
-      !> The slider
+   pure function observe(self, time) result(motion)
       class(slider_quasistatic_type), intent(in) :: self
-      !> Force at displacement 0 [N]
-      real(wp), intent(in) :: force
-      !> Displacement of the end of the spring [m]
-      real(wp) :: value
-
-      value = self%displacement + force / self%pull_over_value
-   end function value_of_pull
-
-   !> The motion at a time of the last advance.
-   pure function observe_quasistatic(self, time) result(motion)
-      !> The slider
-      class(slider_quasistatic_type), intent(in) :: self
-      !> Time [s]
       real(wp), intent(in) :: time
-      !> The motion
       type(motion_type) :: motion
 
       real(wp) :: displacement, step
@@ -290,23 +259,17 @@ contains
       motion%spring_force = self%pull(time) - self%stiffness * displacement
       motion%elastic_force = motion%spring_force
       motion%drive_displacement = self%origin + self%drive%at(time)
-   end function observe_quasistatic
+   end function observe
 
-   !> Energy of the drive's spring.
    pure function energy(self)
-      !> The slider
       class(slider_quasistatic_type), intent(in) :: self
-      !> Energy [J]
       real(wp) :: energy
 
       energy = 0.5_wp * self%stiffness * (self%drive%at(self%time) - self%displacement)**2
    end function energy
 
-   !> Move the origin of displacements.
    subroutine shift_origin(self, shift)
-      !> The slider
       class(slider_quasistatic_type), intent(inout) :: self
-      !> Displacement of the new origin [m]
       real(wp), intent(in) :: shift
 
       call shift_slider(self, shift)
@@ -314,11 +277,8 @@ contains
       call shift_law(self%law, shift)
    end subroutine shift_origin
 
-   !> Put the state into an archive or take it out.
    subroutine exchange(self, archive)
-      !> The slider
       class(slider_quasistatic_type), intent(inout) :: self
-      !> The archive
       type(archive_type), intent(inout) :: archive
 
       call archive%section("quasistatic slider")

@@ -2,8 +2,8 @@
 !>
 !> Under a linear law of the contact force the motion is that of a linear system with constant
 !> coefficients. It is advanced by its Taylor series over steps so short that the series is exact to
-!> rounding; nothing is a matter of step size. Events are short compared with any period of the
-!> system, so a few terms do.
+!> rounding. Times between events are short compared with any period of the system, so that a few
+!> terms are enough.
 module mesoslip_sliders_rigid
    use mesoslip_interface_law, only: interface_law_type, window_type
    use mesoslip_numerics_archive, only: archive_type
@@ -43,11 +43,8 @@ contains
 
    !> Set up a rigid slider from named numbers.
    subroutine make_slider_rigid(slider, parameters, error)
-      !> The slider
       class(slider_type), allocatable, intent(out) :: slider
-      !> Mass, stiffness and damping
       type(parameters_type), intent(inout) :: parameters
-      !> Set if a number is missing or superfluous
       type(error_type), allocatable, intent(inout) :: error
 
       type(slider_rigid_type), allocatable :: self
@@ -58,16 +55,14 @@ contains
       call parameters%take("damping", self%damping, error)
       call parameters%finish(error)
       if (allocated(error)) return
+      self%has_passages = .true.
       self%inverse_mass = 1.0_wp / self%mass
       self%own_rate = sqrt(self%stiffness * self%inverse_mass)
       call move_alloc(self, slider)
    end subroutine make_slider_rigid
 
-   !> Put the slider at rest in balance with the contacts.
    subroutine start(self, law)
-      !> The slider, its displacement zero
       class(slider_rigid_type), intent(inout) :: self
-      !> Contact force at the start
       type(interface_law_type), intent(in) :: law
 
       self%law = law
@@ -78,26 +73,18 @@ contains
       self%series = 0.0_wp
    end subroutine start
 
-   !> Move until the first end of a window, or less far.
    subroutine advance(self, law, window)
-      !> The slider
       class(slider_rigid_type), intent(inout) :: self
-      !> Contact force
       type(interface_law_type), intent(in) :: law
-      !> Where the law holds
       type(window_type), intent(in) :: window
 
       self%law = law
-      call step_on(self, constants(self), window)
+      call take_step(self, constants(self), window)
    end subroutine advance
 
-   !> Move through a schedule until it ends, or until a step is of interest.
    subroutine run_ahead(self, schedule, filter)
-      !> The slider
       class(slider_rigid_type), intent(inout) :: self
-      !> Coming changes of the contact force
       type(schedule_type), intent(inout) :: schedule
-      !> Which steps are of interest; the slider stops after one
       type(step_filter_type), intent(inout) :: filter
 
       type(system_type) :: system
@@ -111,7 +98,7 @@ contains
       do
          self%law = schedule%law()
          call schedule%hazard%offer(self%displacement, self%clock)
-         call step_on(self, system, schedule%window(self%time))
+         call take_step(self, system, schedule%window(self%time))
          call schedule%hazard%advance(self%clock)
          call filter%examine(self%time, self%velocity, self%start_acceleration, self%acceleration)
          if (filter%is_selected .or. self%direction * schedule%direction < 0.0_wp) return
@@ -120,8 +107,8 @@ contains
       end do
    end subroutine run_ahead
 
-   !> One step: a short one, as nearly all between two events, or any.
-   subroutine step_on(self, constant, whole_window)
+   !> One step: a short one, as nearly all between two events, or another.
+   subroutine take_step(self, constant, whole_window)
       type(slider_rigid_type), intent(inout) :: self
       type(system_type), intent(in) :: constant
       type(window_type), intent(in) :: whole_window
@@ -158,15 +145,11 @@ contains
          if (.not. is_done) call try_short_step(self, system, window, early, is_done)
       end if
       if (.not. is_done) call take_long_step(self, system, window, early)
-   end subroutine step_on
+   end subroutine take_step
 
-   !> The motion at a time of the last advance.
    pure function observe(self, time) result(motion)
-      !> The slider
       class(slider_rigid_type), intent(in) :: self
-      !> Time [s]
       real(wp), intent(in) :: time
-      !> The motion
       type(motion_type) :: motion
 
       real(wp) :: displacement, drive, step
@@ -205,22 +188,16 @@ contains
       velocity = horner(series, terms, time)
    end subroutine evaluate
 
-   !> Kinetic energy and that of the drive's spring.
    pure function energy(self)
-      !> The slider
       class(slider_rigid_type), intent(in) :: self
-      !> Energy [J]
       real(wp) :: energy
 
       energy = 0.5_wp * self%mass * self%velocity**2 &
          & + 0.5_wp * self%stiffness * (self%drive%at(self%time) - self%displacement)**2
    end function energy
 
-   !> Move the origin of displacements.
    subroutine shift_origin(self, shift)
-      !> The slider
       class(slider_rigid_type), intent(inout) :: self
-      !> Displacement of the new origin [m]
       real(wp), intent(in) :: shift
 
       call shift_slider(self, shift)
@@ -228,14 +205,9 @@ contains
       call shift_law(self%law, shift)
    end subroutine shift_origin
 
-   !> Put the state into an archive or take it out.
    subroutine exchange(self, archive)
-      !> The slider
       class(slider_rigid_type), intent(inout) :: self
-      !> The archive
       type(archive_type), intent(inout) :: archive
-
-      real(wp), allocatable :: series(:)
 
       call archive%section("rigid slider")
       call exchange_slider(self, archive)
@@ -243,9 +215,7 @@ contains
       call exchange_law(self%law, archive)
       call archive%exchange("start_displacement", self%start_displacement)
       call archive%exchange("terms", self%terms)
-      series = self%series
-      call archive%exchange("series", series)
-      if (size(series) == size(self%series)) self%series = series
+      call archive%exchange_fixed("series", [long_terms, 1], self%series)
    end subroutine exchange
 
 end module mesoslip_sliders_rigid

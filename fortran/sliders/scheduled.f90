@@ -1,4 +1,4 @@
-!> Sliders that run through a schedule of many events at once, being recorded here and there only.
+!> Sliders that run through a schedule of many events at once, recorded at steps of interest only.
 module mesoslip_sliders_scheduled
    use mesoslip_schedule, only: schedule_type
    use mesoslip_sliders_base, only: slider_type
@@ -11,7 +11,6 @@ module mesoslip_sliders_scheduled
    !> A slider that can run through a schedule while its drive does not accelerate.
    type, abstract, extends(slider_type) :: scheduled_slider_type
    contains
-      !> Move through a schedule until it ends, or until a step is of interest
       procedure(run_ahead_interface), deferred :: run_ahead
    end type scheduled_slider_type
 
@@ -21,7 +20,6 @@ module mesoslip_sliders_scheduled
       subroutine run_ahead_interface(self, schedule, filter)
          import :: scheduled_slider_type, schedule_type, step_filter_type
          implicit none
-         !> The slider
          class(scheduled_slider_type), intent(inout) :: self
          !> Coming changes of the contact force
          type(schedule_type), intent(inout) :: schedule

@@ -66,17 +66,11 @@ module mesoslip_theory_lives
       real(wp), private :: acceptance = 1.0_wp
       real(wp), private :: point(points) = 0.0_wp, weight(points) = 0.0_wp
    contains
-      !> Breaks of newborns over displacement
       procedure, non_overridable :: newborn_rates
-      !> Survival of newborns
       procedure, non_overridable :: newborn_state
-      !> Breaks of the first generation over displacement
       procedure, non_overridable :: first_rates
-      !> Survival of the first generation
       procedure, non_overridable :: first_state
-      !> Spread the lives of contacts of a table over a window
       procedure, non_overridable :: spread_table
-      !> The scales by name
       procedure, non_overridable :: scales
    end type contact_lives_type
 
@@ -95,7 +89,6 @@ contains
 
    !> Set up contacts.
    subroutine new_contact_lives(self, law, coupling, back_force, newborn_width, reattach, initial)
-      !> The contacts
       type(contact_lives_type), intent(out) :: self
       !> Law of the thresholds, all above the back force
       class(threshold_law_type), intent(in) :: law
@@ -185,7 +178,6 @@ contains
 
    !> Spread the lives of contacts with the stiffnesses of a table over a window.
    subroutine spread_table(self, window)
-      !> The contacts
       class(contact_lives_type), intent(inout) :: self
       !> Length of the window
       real(wp), intent(in) :: window
@@ -195,7 +187,6 @@ contains
 
    !> Set up the lives of contacts from named numbers.
    subroutine make_contact_lives(self, parameters, error)
-      !> The contacts
       type(contact_lives_type), intent(out) :: self
       !> Law, coupling and initial state; relative width, back force and spread of the
       !> stretch of newborns; whether contacts attach again
@@ -225,7 +216,6 @@ contains
 
    !> Scales of the lives.
    pure function scales(self)
-      !> The contacts
       class(contact_lives_type), intent(in) :: self
       !> Scales in the order of scale_names
       real(wp) :: scales(size(scale_names))
@@ -261,7 +251,6 @@ contains
 
    !> Breaks of newborns over displacement.
    pure function newborn_rates(self, life) result(rates)
-      !> The contacts
       class(contact_lives_type), intent(in) :: self
       !> Displacement since the attaching
       real(wp), intent(in) :: life
@@ -279,7 +268,6 @@ contains
 
    !> Survival of newborns.
    pure function newborn_state(self, life) result(state)
-      !> The contacts
       class(contact_lives_type), intent(in) :: self
       !> Displacement since the attaching
       real(wp), intent(in) :: life
@@ -378,7 +366,6 @@ contains
 
    !> Breaks of the first generation over displacement.
    pure function first_rates(self, displacement) result(rates)
-      !> The contacts
       class(contact_lives_type), intent(in) :: self
       !> Displacement since the start
       real(wp), intent(in) :: displacement
@@ -423,7 +410,6 @@ contains
 
    !> Survival of the first generation.
    pure function first_state(self, displacement) result(state)
-      !> The contacts
       class(contact_lives_type), intent(in) :: self
       !> Displacement since the start
       real(wp), intent(in) :: displacement

@@ -39,7 +39,6 @@ contains
       real(wp), intent(in) :: start, width
       !> Number of panels, and of points in each
       integer, intent(in) :: panels, points
-      !> The solution
       type(renewal_solution_type), intent(out) :: solution
 
       real(wp), allocatable :: kernel(:, :, :, :), released(:, :, :)

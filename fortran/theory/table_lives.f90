@@ -37,13 +37,9 @@ module mesoslip_theory_table_lives
       !> Moments of newborns, and of contacts that attached with no force
       type(life_moments_type), private :: newborn, unforced
    contains
-      !> Spread lives over a window
       procedure, non_overridable :: spread
-      !> Breaks of newborns over displacement, the force and the stiffness lost by them
       procedure, non_overridable :: newborn_rates
-      !> Part of newborns that is pinned, its stiffness and force
       procedure, non_overridable :: newborn_state
-      !> The same of a first generation: relaxed, as in slow sliding, or of uniform stretches
       procedure, non_overridable :: relaxed_rates
       procedure, non_overridable :: relaxed_state
       procedure, non_overridable :: steady_rates
@@ -56,7 +52,6 @@ contains
 
    !> Set up the lives of the contacts of a table.
    subroutine new_table_lives(self, cells, mean_square, back_force)
-      !> The lives
       type(table_lives_type), intent(out) :: self
       !> The table, without contacts that the back force breaks
       type(stretch_cells_type), intent(in) :: cells
@@ -85,7 +80,6 @@ contains
 
    !> Spread lives over a window.
    pure subroutine spread(self, window)
-      !> The lives
       class(table_lives_type), intent(inout) :: self
       !> Length of the window; that around a life does not begin before 0
       real(wp), intent(in) :: window
@@ -130,7 +124,6 @@ contains
 
    !> Breaks of newborns over displacement.
    pure function newborn_rates(self, life) result(rates)
-      !> The contacts
       class(table_lives_type), intent(in) :: self
       !> Displacement since the attaching
       real(wp), intent(in) :: life
@@ -144,7 +137,6 @@ contains
 
    !> Survival of newborns.
    pure function newborn_state(self, life) result(state)
-      !> The contacts
       class(table_lives_type), intent(in) :: self
       !> Displacement since the attaching
       real(wp), intent(in) :: life
@@ -158,7 +150,6 @@ contains
 
    !> Breaks of contacts that were relaxed.
    pure function relaxed_rates(self, displacement) result(rates)
-      !> The contacts
       class(table_lives_type), intent(in) :: self
       !> Displacement since the start
       real(wp), intent(in) :: displacement
@@ -172,7 +163,6 @@ contains
 
    !> Survival of contacts that were relaxed.
    pure function relaxed_state(self, displacement) result(state)
-      !> The contacts
       class(table_lives_type), intent(in) :: self
       !> Displacement since the start
       real(wp), intent(in) :: displacement
@@ -186,7 +176,6 @@ contains
 
    !> Breaks of contacts of slow sliding: as many for each displacement since the attaching.
    pure function steady_rates(self, displacement) result(rates)
-      !> The contacts
       class(table_lives_type), intent(in) :: self
       !> Displacement since the start
       real(wp), intent(in) :: displacement
@@ -202,7 +191,6 @@ contains
 
    !> Survival of contacts of slow sliding: of a life l the part 1 - x/l.
    pure function steady_state(self, displacement) result(state)
-      !> The contacts
       class(table_lives_type), intent(in) :: self
       !> Displacement since the start
       real(wp), intent(in) :: displacement
@@ -222,7 +210,6 @@ contains
 
    !> Breaks of contacts of uniform stretches.
    pure function uniform_rates(self, displacement) result(rates)
-      !> The contacts
       class(table_lives_type), intent(in) :: self
       !> Displacement since the start
       real(wp), intent(in) :: displacement
@@ -237,7 +224,6 @@ contains
 
    !> Survival of contacts of uniform stretches: the part 1 - x/x_s, uniform above x.
    pure function uniform_state(self, displacement) result(state)
-      !> The contacts
       class(table_lives_type), intent(in) :: self
       !> Displacement since the start
       real(wp), intent(in) :: displacement

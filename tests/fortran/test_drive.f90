@@ -171,7 +171,7 @@ contains
       call check_close(slider%drive%stage_impulse(), &
          & 0.5_wp * rate * times(2)**2 + acceleration * times(2)**3 / 6.0_wp, 1.0e-15_wp, &
          & "impulse of a force")
-      call check(slider%max_breaks() < huge(1.0_wp), "contacts can break without end")
+      call check(slider%max_breaks < huge(1.0_wp), "contacts can break without end")
    end subroutine pulls_with_a_force
 
    !> A prescribed slider that accelerates from rest: the contact force K x + C v has an extreme at

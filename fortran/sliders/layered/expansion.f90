@@ -12,7 +12,6 @@ contains
 
    !> Taylor coefficients of the motion.
    subroutine expand(system, state, terms, series)
-      !> The system
       type(system_type), intent(in) :: system
       !> Displacement and velocity of the base, then of each layer, shape (0:layers, 2)
       real(wp), intent(in), contiguous :: state(0:, :)

@@ -1,5 +1,5 @@
-!> CVODE for a chain of layers: the reference for the series, and for systems so stiff that the
-!> fastest rate has no part in the motion.
+!> CVODE for a chain of layers: a check of the series, and for systems so stiff that the fastest
+!> rate does not matter for the motion.
 !>
 !> It restarts after each event, and events are found in the polynomial of each of its steps.
 module mesoslip_sliders_layered_integrator
@@ -13,15 +13,15 @@ module mesoslip_sliders_layered_integrator
 
    public :: integrator_type
 
-   !> Half the bandwidth of the Jacobian, with displacements and velocities in turn.
+   !> Half the bandwidth of the Jacobian, with displacements and velocities in turn
    integer, parameter :: half_bandwidth = 3
-   !> Steps without an event after which it restarts, so that a run can be put away: as many as
-   !> take about a second with very many layers, within bounds
+   !> Steps without an event after which it restarts, so that a run can be saved: about a second
+   !> with very many layers, within bounds
    integer, parameter :: min_steps = 200, max_steps = 2000, max_layer_steps = 1000000
 
    !> CVODE with a state of its own.
    type :: integrator_type
-      !> Whether it has to restart
+      !> Whether CVODE has to restart
       logical :: is_stale = .true.
       type(cvode_type), private :: cvode
       !> State in CVODE's order, and the time from which its time counts
@@ -29,18 +29,14 @@ module mesoslip_sliders_layered_integrator
       real(wp), private :: start_time = 0.0_wp
       !> CVODE's time, which has more digits than the time of the run
       real(wp), private :: local_time = 0.0_wp
-      !> Steps since it restarted
+      !> Steps since the last restart
       integer, private :: steps = 0
-      !> Steps, evaluations and failed steps before the run was put away
+      !> Steps, evaluations and failed steps before the run was saved
       integer(i8), private :: counts_before(3) = 0_i8
    contains
-      !> Take a step
       procedure, non_overridable :: step
-      !> Take note that a step was used
       procedure, non_overridable :: end_step
-      !> Restart at the next step, with counts of an earlier run
       procedure, non_overridable :: reset
-      !> Free what it holds
       procedure, non_overridable :: close
       procedure, non_overridable, private :: restart
    end type integrator_type
@@ -49,9 +45,7 @@ contains
 
    !> A step of CVODE, as a series from its start.
    subroutine step(self, system, state, time, end_time, terms, series, length, ends, error)
-      !> The integrator
       class(integrator_type), intent(inout) :: self
-      !> The system
       type(system_type), intent(in), target :: system
       !> Displacement and velocity of the base, then of each layer, shape (0:layers, 2)
       real(wp), intent(in), contiguous :: state(0:, :)
@@ -62,7 +56,7 @@ contains
       real(wp), intent(inout), contiguous :: series(0:, :, 0:)
       !> Length of the step
       real(wp), intent(out) :: length
-      !> Whether it comes to that time
+      !> Whether it reaches that time
       logical, intent(out) :: ends
       !> Set if CVODE fails
       type(error_type), allocatable, intent(inout) :: error
@@ -120,9 +114,8 @@ contains
       self%steps = 0
    end subroutine restart
 
-   !> Take note that a step was used, and count.
+   !> Count a step that was used.
    subroutine end_step(self, layers, counts)
-      !> The integrator
       class(integrator_type), intent(inout) :: self
       !> Number of layers
       integer, intent(in) :: layers
@@ -138,7 +131,6 @@ contains
 
    !> Restart at the next step, with counts of an earlier run.
    subroutine reset(self, counts)
-      !> The integrator
       class(integrator_type), intent(inout) :: self
       !> Steps, evaluations and failed steps so far
       integer(i8), intent(in) :: counts(3)
@@ -148,9 +140,7 @@ contains
       self%is_stale = .true.
    end subroutine reset
 
-   !> Free what it holds.
    subroutine close(self)
-      !> The integrator
       class(integrator_type), intent(inout) :: self
 
       call self%cvode%close()

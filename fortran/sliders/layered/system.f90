@@ -46,9 +46,7 @@ contains
 
    !> The system of a slider.
    pure function new_system(parameters) result(system)
-      !> Parameters of the slider
       type(layered_parameters_type), intent(in) :: parameters
-      !> The system
       type(system_type) :: system
 
       system%parameters = parameters
@@ -75,10 +73,10 @@ contains
       rate = rate + (system%law%drag + 4.0_wp * system%dashpot) / system%layer_mass
    end function fastest_rate
 
-   !> Accelerations of base and layers, times a factor, without what acts from outside.
+   !> Accelerations of base and layers, times a factor, without drive and origins of contacts.
    pure subroutine accelerate(system, factor, pull, displacement, velocity, acceleration)
       type(system_type), intent(in) :: system
-      !> The factor, and an acceleration that the last layer has besides [m/s2]
+      !> The factor, and a further acceleration of the last layer [m/s2]
       real(wp), intent(in) :: factor, pull
       real(wp), intent(in) :: displacement(0:), velocity(0:)
       real(wp), intent(out) :: acceleration(0:)
@@ -144,7 +142,7 @@ contains
       end if
    end subroutine push
 
-   !> Second terms of the velocities by the rate of the contact force.
+   !> Add the rate of the contact force to the second terms of the velocities.
    pure subroutine push_at_a_rate(system, term)
       type(system_type), intent(in) :: system
       real(wp), intent(inout) :: term(0:)

@@ -48,7 +48,7 @@ contains
       step = window%end_time - self%time
       ends = step * rate <= max_step
       if (.not. ends) step = max_step / rate
-      ! Most steps end at a break: no need for a series that reaches farther.
+      ! Most steps end at a break: a longer series is not needed.
       if (self%velocity > 0.0_wp) then
          gap = window%upper - self%displacement
       else
@@ -86,7 +86,7 @@ contains
       type(motion_rates_type), intent(in) :: early
       !> Length of the step [s]
       real(wp), intent(in) :: longest
-      !> Whether the step comes to the end of the window's time
+      !> Whether the step reaches the end of the window's time
       logical, intent(in) :: ends
       !> Terms of the series
       integer, intent(in) :: terms
@@ -190,8 +190,7 @@ contains
       end do
    end subroutine expand
 
-   !> Add the losses of a step to the energy balance, the integrals of C V**2 and M D V, by a Gauss
-   !> rule.
+   !> Add the losses of a step to the energy balance, the integrals of C V**2 and M D V.
    subroutine add_losses(self, damper, step, terms, point, weight)
       class(rigid_state_type), intent(inout) :: self
       !> Coefficients of the damper

@@ -1,8 +1,8 @@
 !> A rigid slider in a schedule of contacts without clocks, under a drive of constant velocity.
 !>
-!> Nearly all steps are short ones. When a step ends is known only at the end of a chain of
-!> operations, each of which waits for the one before, and whether a contact breaks or attaches then
-!> cannot be foreseen. Work and losses of the step before are added up meanwhile.
+!> Nearly all steps are short ones. The end of a step is known only after a chain of operations,
+!> each of which waits for the one before, and the processor cannot predict whether a contact breaks
+!> or attaches then. Meanwhile work and losses of the step before are added up.
 module mesoslip_sliders_rigid_run_through
    use mesoslip_interface_law, only: interface_law_type, window_type
    use mesoslip_numerics_kinds, only: wp
@@ -20,13 +20,10 @@ module mesoslip_sliders_rigid_run_through
 
 contains
 
-   !> Move through a schedule until it ends, or until a step is of interest.
+   !> The procedure run_ahead of such a slider.
    subroutine run_through(self, schedule, filter)
-      !> The slider
       class(rigid_state_type), intent(inout) :: self
-      !> Coming changes of the contact force
       type(schedule_type), intent(inout) :: schedule
-      !> Which steps are of interest; the slider stops after one
       type(step_filter_type), intent(inout) :: filter
 
       type(system_type) :: system

@@ -1,11 +1,12 @@
 !> Steps of a rigid slider that has settled to rest, or to uniform creep with its drive.
 !>
-!> Contacts that hold the slider, and a damper or their drag, bring it there. In a long hold a
-!> contact that breaks by thermal activation shakes it, and nothing happens for a long time then.
+!> Pinned contacts, and a damper or drag, lead to this. In a long hold a contact that breaks by
+!> thermal activation shakes the slider, and then nothing happens for a long time.
 module mesoslip_sliders_rigid_settled_step
    use mesoslip_interface_law, only: window_type
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_sliders_hazard_clock, only: advance_clocks
+   use mesoslip_sliders_motion_series, only: long_time, rounding
    use mesoslip_sliders_rigid_state, only: arrive, few_terms, motion_rates_type, pull, &
       & rigid_state_type, system_type, uniform_gap
    implicit none
@@ -13,22 +14,13 @@ module mesoslip_sliders_rigid_settled_step
 
    public :: try_settled_step
 
-   !> Forces that differ by this part are equal up to rounding.
-   real(wp), parameter :: rounding = 16.0_wp * epsilon(1.0_wp)
-   !> Duration of a step over the time of an oscillation, per radian, beyond which one that the
-   !> contact force does not resolve counts as none
-   real(wp), parameter :: long_time = 2.0_wp
-
 contains
 
-   !> Go on uniformly to the first end of a window or until a clock is due, if the motion differs
-   !> from that by rounding only, or by what the contact force does not resolve.
+   !> Move uniformly to the first end of a window or until a clock is due, if the motion differs
+   !> from this by less than rounding or the resolution of the contact force.
    subroutine try_settled_step(self, system, window, early, is_done)
-      !> The slider, its drive without acceleration
       class(rigid_state_type), intent(inout) :: self
-      !> Its equation of motion
       type(system_type), intent(in) :: system
-      !> Where the contact force holds
       type(window_type), intent(in) :: window
       !> The motion at the start of the step
       type(motion_rates_type), intent(in) :: early
@@ -46,7 +38,7 @@ contains
          & * (abs(self%law%stiffness * self%displacement) + abs(self%law%offset))
       step = window%end_time - self%time
       if (self%law%tolerance > noise .and. step * sqrt(system%stiffness) > long_time) then
-         ! The slider comes to where it is in balance at the end of the step.
+         ! The slider is in balance at the end of the step.
          noise = self%law%tolerance
          velocity = velocity + early%acceleration / (system%stiffness * step)
       end if

@@ -1,10 +1,10 @@
-!> Short steps of a rigid slider, in which it keeps its pace: seven in eight, in Klein's case.
+!> Short steps of a rigid slider, in which its velocity hardly changes: seven in eight, in Klein's
+!> case.
 !>
-!> With p the time in which the distance to the next break would be made at the present velocity,
-!> the series of the displacement is distance/V = t + A_2 t**2/p + A_3 t**3/p**2 + ..., and its
-!> reversion gives the time of the break without iteration, p (1 - A_2 + (2 A_2**2 - A_3) + ...),
-!> exact to rounding or nearly so. Other steps are for the module of long steps, as are those under
-!> a drive that accelerates.
+!> With p the time to the next break at the present velocity, the series of the displacement is
+!> distance/V = t + A_2 t**2/p + A_3 t**3/p**2 + ..., and its reversion gives the time of the break
+!> without iteration, p (1 - A_2 + (2 A_2**2 - A_3) + ...), exact to rounding or nearly so. Other
+!> steps, and those under a drive that accelerates, are in the module of long steps.
 module mesoslip_sliders_rigid_short_step
    use mesoslip_interface_law, only: interface_law_type, window_type
    use mesoslip_numerics_kinds, only: wp
@@ -21,16 +21,16 @@ module mesoslip_sliders_rigid_short_step
    !> Maximum duration of a short step in units of the fastest rate
    real(wp), parameter :: max_step = 3.0e-3_wp
 
-   !> Maximum terms of a series that is reverted: what the reversion leaves out, 42 A_2**5,
-   !> 28 A_2 A_3**2, 7 A_3 A_4 and the like, is below 1e-16.
+   !> Maximum terms of a series that is reverted: the terms left out, 42 A_2**5, 28 A_2 A_3**2,
+   !> 7 A_3 A_4 and the like, are below 1e-16.
    real(wp), parameter :: max_a_2 = 3.0e-4_wp, max_a_3 = 1.0e-7_wp, max_a_4 = 1.0e-10_wp, &
       & max_a_5 = 3.0e-14_wp
    !> Maximum terms with which the reversion is still right to some 1e-6
    real(wp), parameter :: fair_a_2 = 2.0e-2_wp, fair_a_3 = 1.0e-3_wp
 
-   !> What the energy balance needs of a short step.
+   !> The data of a short step for the energy balance.
    type :: step_books_type
-      !> The motion at its start, and how far the drive is ahead of the slider there [m]
+      !> The motion at its start, and the distance to the drive there [m]
       type(motion_rates_type) :: early
       real(wp) :: drive_gap
       !> Drag of the contacts [N s/m]
@@ -43,18 +43,17 @@ module mesoslip_sliders_rigid_short_step
 
    !> A short step.
    type :: short_step_type
-      !> The motion at its start, and how far the drive is ahead of the slider there [m]
+      !> The motion at its start, and the distance to the drive there [m]
       type(motion_rates_type) :: early
       real(wp) :: drive_gap
       !> Derivatives of the acceleration at its start, from the first to the fourth, and of the
       !> damper, from the second to the fourth
       real(wp) :: jerk, snap, crackle, pop, damper_2, damper_3, damper_4
-      !> Distance to the next break [m], time in which it ends without one [s], and one over the
-      !> velocity [s/m]
+      !> Distance to the next break [m], duration if there is none [s], and one over the velocity
+      !> [s/m]
       real(wp) :: distance, rest, inverse_pace
-      !> Its duration [s]
       real(wp) :: duration
-      !> Whether it ends at a break, and where that is [m]; when it ends otherwise [s]
+      !> Whether it ends at a break, and where that is [m]; the time at which it ends otherwise [s]
       logical :: crosses
       real(wp) :: target, end_time
       !> Acceleration at its end [m/s2]
@@ -63,13 +62,10 @@ module mesoslip_sliders_rigid_short_step
 
 contains
 
-   !> Make a short step, if a short series covers it and the slider keeps its pace in it.
+   !> Make a short step, if a short series is exact and the velocity hardly changes in it.
    subroutine try_short_step(self, system, window, early, is_done)
-      !> The slider
       class(rigid_state_type), intent(inout) :: self
-      !> Its equation of motion
       type(system_type), intent(in) :: system
-      !> Where the contact force holds
       type(window_type), intent(in) :: window
       !> The motion at the start of the step
       type(motion_rates_type), intent(in) :: early
@@ -136,7 +132,7 @@ contains
       series(5) = (1.0_wp / 120.0_wp) * step%pop
    end function series_of
 
-   !> Let the motion in a step be observed.
+   !> Keep the motion in a step for observation.
    pure subroutine keep_series(self, step)
       class(rigid_state_type), intent(inout) :: self
       type(short_step_type), intent(in) :: step
@@ -145,13 +141,11 @@ contains
       self%series(:few_terms - 1) = series_of(step)
    end subroutine keep_series
 
-   !> Distance to the next break, and time in which a step ends without one.
+   !> Distance to the next break, and duration of a step without one.
    pure subroutine look_ahead(motion, window, step)
       !> The motion at the start
       type(rigid_motion_type), intent(in) :: motion
-      !> Where the contact force holds
       type(window_type), intent(in) :: window
-      !> The step
       type(short_step_type), intent(inout) :: step
 
       step%target = merge(window%upper, window%lower, motion%velocity > 0.0_wp)
@@ -162,12 +156,12 @@ contains
       if (abs(motion%velocity) > 0.0_wp) step%inverse_pace = 1.0_wp / motion%velocity
    end subroutine look_ahead
 
-   !> Whether a step is a short one, and when it ends.
+   !> Find the end of a step, if it is a short one.
    pure subroutine find_end(system, damping, step, is_found)
-      !> Equation of motion, and damping rate [1/s]
       type(system_type), intent(in) :: system
+      !> Damping rate [1/s]
       real(wp), intent(in) :: damping
-      !> The step, with its derivatives, which has looked ahead
+      !> The step, after derive and look_ahead
       type(short_step_type), intent(inout) :: step
       !> Whether it is a short one
       logical, intent(out) :: is_found
@@ -177,7 +171,8 @@ contains
       is_found = .false.
       pace = abs(step%early%velocity)
       if (.not. (pace > 0.0_wp .and. step%distance > 0.0_wp .and. step%rest > 0.0_wp)) return
-      ! Whether a contact breaks cannot be foreseen: this is known long before the time of that.
+      ! The processor cannot predict whether a contact breaks. The first condition, on which this
+      ! mostly depends, is known long before the time of the break, so its branch has its own call.
       if (step%distance < pace * step%rest) then
          call find_crossing(system, damping, step, is_found)
       else if (step%distance < 2.0_wp * pace * step%rest) then
@@ -187,7 +182,7 @@ contains
       end if
    end subroutine find_end
 
-   !> Whether a step that comes near a break is a short one, and when it ends.
+   !> Find the end of a step near a break, if it is a short one.
    pure subroutine find_crossing(system, damping, step, is_found)
       type(system_type), intent(in) :: system
       real(wp), intent(in) :: damping
@@ -205,7 +200,7 @@ contains
       if (.not. step%crosses) step%duration = step%rest
    end subroutine find_crossing
 
-   !> Whether a step that ends before a break is a short one.
+   !> Find the end of a step far from any break, if it is a short one.
    pure subroutine find_pause(system, damping, step, is_found)
       type(system_type), intent(in) :: system
       real(wp), intent(in) :: damping
@@ -217,7 +212,7 @@ contains
 
       is_found = .false.
       if (is_long(system, damping, step%rest)) return
-      ! Too far from any break to come to it in the time that is left.
+      ! A velocity that changes by less than half cannot reach the break.
       series = series_of(step)
       change = 0.0_wp
       do term = few_terms - 1, 1, -1
@@ -239,13 +234,13 @@ contains
          & + 2.0_wp * (system%drag + 2.0_wp * damping)**2) > max_step**2
    end function is_long
 
-   !> Time in which a distance is made, by reversion of the series of the displacement.
+   !> Time in which a distance is covered, by reversion of the series of the displacement.
    pure subroutine revert(step, distance, passage, inverse_pace, time, is_right)
-      !> The step, with its derivatives
+      !> The step, after derive
       type(short_step_type), intent(in) :: step
       !> The distance, the time at the present velocity, and one over that velocity
       real(wp), intent(in) :: distance, passage, inverse_pace
-      !> The time; whether it is right
+      !> The time, and whether it is right
       real(wp), intent(out) :: time
       logical, intent(out) :: is_right
 
@@ -271,7 +266,6 @@ contains
    pure function nearer(series, distance, time) result(better)
       !> Coefficients of the velocity
       real(wp), intent(in) :: series(0:)
-      !> The distance
       real(wp), intent(in) :: distance
       !> Time of the crossing, right to some 1e-6
       real(wp), intent(in) :: time
@@ -285,16 +279,12 @@ contains
          & * (1.0_wp + change * (0.5_wp * series(1) + series(2) * time) / velocity)
    end function nearer
 
-   !> Where the slider is at the end of a step, and its acceleration there.
+   !> The motion at the end of a step.
    pure subroutine move(self, system, law, step, motion)
-      !> The slider, of which the drive, mass, spring and damping count
       class(rigid_state_type), intent(in) :: self
-      !> Its equation of motion, and the contact force
       type(system_type), intent(in) :: system
       type(interface_law_type), intent(in) :: law
-      !> The step
       type(short_step_type), intent(inout) :: step
-      !> The motion
       type(rigid_motion_type), intent(inout) :: motion
 
       real(wp) :: square, start_time
@@ -325,7 +315,6 @@ contains
       step%acceleration = late%acceleration
    end subroutine move
 
-   !> What the energy balance needs of a step.
    pure function books_of(step, drag) result(books)
       type(short_step_type), intent(in) :: step
       !> Drag of the contacts [N s/m]
@@ -348,7 +337,7 @@ contains
       square = step%duration**2
       damper_rate = self%damping * (step%acceleration - motion%damper)
       associate (early => step%early, time => step%duration)
-         ! A share of (rate times step)**2 of the balance: four terms do.
+         ! A share of (rate times step)**2 of the balance: four terms are enough.
          call pull(self, step%drive_gap, time, inverse(2) * square * (early%velocity &
             & + inverse(3) * time * (early%acceleration + inverse(4) * time * (step%jerk &
             & + inverse(5) * time * step%snap))))

@@ -11,8 +11,8 @@ module mesoslip_sliders_rigid_state
    public :: constants, drive_gap_at, motion_rates, rates, uniform_gap, pull, pull_unevenly, arrive
    public :: few_terms, some_terms, many_terms, long_terms
 
-   !> Terms of the series of steps from short to long. What a series leaves out is less than 1e-16
-   !> of its two leading terms.
+   !> Terms of the series of steps from short to long. The terms left out are less than 1e-16 of the
+   !> first two.
    integer, parameter :: few_terms = 6, some_terms = 8, many_terms = 10, long_terms = 17
 
    !> Coefficients of the equation of motion, per mass of the slider:
@@ -23,7 +23,7 @@ module mesoslip_sliders_rigid_state
       !> (K + K_c)/M [1/s2], C/M [1/s], and K/M times the drive's velocity at the start of a step
       !> [m/s3] and times its acceleration [m/s4]
       real(wp) :: stiffness, drag, driving, driving_rate
-      !> How far the drive is ahead of the slider at the start of a step [m], and its velocity [m/s]
+      !> Distance from the slider to the drive at the start of a step [m], and its velocity [m/s]
       real(wp) :: drive_gap, drive_velocity
    end type system_type
 
@@ -35,7 +35,7 @@ module mesoslip_sliders_rigid_state
       real(wp) :: damper, damper_rate
    end type motion_rates_type
 
-   !> Where the slider is, and how it moves.
+   !> The motion of the slider.
    type :: rigid_motion_type
       !> Time [s], displacement [m], velocity [m/s], deceleration by the damper [m/s2]
       real(wp) :: time, displacement, velocity, damper
@@ -56,7 +56,6 @@ module mesoslip_sliders_rigid_state
       integer :: terms = few_terms
       real(wp) :: series(0:long_terms - 1) = 0.0_wp
    contains
-      !> Where it is, and being put elsewhere
       procedure, non_overridable :: motion
       procedure, non_overridable :: take_motion
    end type rigid_state_type
@@ -78,22 +77,16 @@ contains
       system%drive_gap = 0.0_wp
    end function constants
 
-   !> Where the slider is, and how it moves.
    pure function motion(self)
-      !> The slider
       class(rigid_state_type), intent(in) :: self
-      !> Its motion
       type(rigid_motion_type) :: motion
 
       motion = rigid_motion_type(self%time, self%displacement, self%velocity, self%damper, &
          & self%direction)
    end function motion
 
-   !> Put the slider where it has come to.
    pure subroutine take_motion(self, motion)
-      !> The slider
       class(rigid_state_type), intent(inout) :: self
-      !> Its motion
       type(rigid_motion_type), intent(in) :: motion
 
       self%time = motion%time
@@ -103,22 +96,19 @@ contains
       self%direction = motion%direction
    end subroutine take_motion
 
-   !> How far a drive of constant velocity is ahead of the slider, which is somewhere else.
+   !> Distance from a motion of the slider to a drive of constant velocity [m].
    pure function drive_gap_at(self, motion) result(drive_gap)
       class(rigid_state_type), intent(in) :: self
-      !> Where the slider is
       type(rigid_motion_type), intent(in) :: motion
-      !> The gap [m]
       real(wp) :: drive_gap
 
       drive_gap = self%drive%value - motion%displacement &
          & + self%drive%rate * (motion%time - self%drive%time)
    end function drive_gap_at
 
-   !> How far a drive of constant velocity is ahead of the slider.
+   !> Distance from the slider to a drive of constant velocity [m].
    pure function uniform_gap(self) result(drive_gap)
       class(rigid_state_type), intent(in) :: self
-      !> The gap [m]
       real(wp) :: drive_gap
 
       drive_gap = drive_gap_at(self, self%motion())
@@ -129,9 +119,8 @@ contains
       type(system_type), intent(in) :: system
       !> Damping rate [1/s]
       real(wp), intent(in) :: damping
-      !> Where the slider is
       type(rigid_motion_type), intent(in) :: motion
-      !> How far the drive is ahead of the slider [m], and the contact force without drag [N]
+      !> Distance to the drive [m], and contact force without drag [N]
       real(wp), intent(in) :: drive_gap, contact_force
       type(motion_rates_type) :: rates
 
@@ -146,7 +135,7 @@ contains
    pure function rates(self, system, drive_gap) result(motion)
       class(rigid_state_type), intent(in) :: self
       type(system_type), intent(in) :: system
-      !> How far the drive is ahead of the slider [m]
+      !> Distance to the drive [m]
       real(wp), intent(in) :: drive_gap
       type(motion_rates_type) :: motion
 
@@ -157,14 +146,12 @@ contains
 
    !> Observations at the end of any step.
    subroutine arrive(self, system, early, drive_gap, late)
-      !> The slider, where it is at the end of the step
       class(rigid_state_type), intent(inout) :: self
       type(system_type), intent(in) :: system
       !> The motion at the start of the step
       type(motion_rates_type), intent(in) :: early
-      !> How far the drive is ahead of the slider at the end of the step [m]
+      !> Distance to the drive, and motion, at the end of the step [m]
       real(wp), intent(in) :: drive_gap
-      !> The motion at the end of the step
       type(motion_rates_type), intent(out) :: late
 
       if (abs(self%velocity) > 0.0_wp) self%direction = sign(1.0_wp, self%velocity)
@@ -173,10 +160,10 @@ contains
       self%start_acceleration = early%acceleration
    end subroutine arrive
 
-   !> Add the drive's impulse of a step to the balance, its velocity being constant.
+   !> Add the impulse of a drive of constant velocity in a step to the energy balance.
    subroutine pull(self, drive_gap, step, swept)
       class(rigid_state_type), intent(inout) :: self
-      !> How far the drive is ahead of the slider at the start of the step [m]
+      !> Distance to the drive at the start of the step [m]
       real(wp), intent(in) :: drive_gap
       !> Length of the step [s], and integral of the displacement over the time [m s]
       real(wp), intent(in) :: step, swept
@@ -185,7 +172,7 @@ contains
          & * (step * (drive_gap + 0.5_wp * self%drive%rate * step) - swept))
    end subroutine pull
 
-   !> Add the drive's impulse and work of a step to the balance, under an acceleration.
+   !> Add impulse and work of an accelerated drive in a step to the energy balance.
    subroutine pull_unevenly(self, system, step, swept, moment)
       class(rigid_state_type), intent(inout) :: self
       type(system_type), intent(in) :: system

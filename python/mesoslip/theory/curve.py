@@ -25,8 +25,8 @@ SUMMARY = {
     ),
     "K_star_error": (
         "N/m",
-        "estimated error of K*; for samples of thresholds two standard deviations, and the correction "
-        "for the bandwidth",
+        "estimated error of K*; for samples of thresholds two standard deviations, and the "
+        "correction for the bandwidth",
     ),
     "K_star_displacement": ("m", "displacement at K*"),
     "K_star_estimate": ("N/m", "estimate of K*, Nk (f_s - f_b)/Delta f_s (S48)"),

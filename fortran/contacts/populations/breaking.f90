@@ -67,7 +67,6 @@ contains
       type(pose_type), intent(in) :: before
       real(wp), intent(in) :: displacement, time, direction
       !> Breaks of populations that start to break in the motion, and where most of them do so [m]
-      !> so [m]
       real(wp), intent(out) :: late, onset
       !> Set if there is not enough memory; nothing breaks then
       type(error_type), allocatable, intent(inout) :: error

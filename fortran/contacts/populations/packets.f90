@@ -34,7 +34,7 @@ module mesoslip_contacts_populations_packets
    type :: expected_births_type
       !> Number of contacts that are detached before the step, and their mass
       real(wp) :: number = 0.0_wp, mass = 0.0_wp
-      !> Number of contacts that break in the step itself, and their mass
+      !> Number of contacts that also break in the step, and their mass
       real(wp) :: own = 0.0_wp, own_mass = 0.0_wp
       !> Latest end of the step for them [s]
       real(wp) :: end_time = huge(1.0_wp)

@@ -207,7 +207,7 @@ contains
       class(pinned_populations_type), intent(inout) :: self
       !> Relative force at attaching, and relative number of contacts
       real(wp), intent(in) :: force, share
-      !> Number of their moments
+      !> Index of their moments
       integer, intent(in) :: moments
       !> Relative threshold up to which no contact attached
       real(wp), intent(in) :: broken

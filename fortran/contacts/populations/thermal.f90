@@ -298,7 +298,7 @@ contains
       real(wp), intent(in) :: origin, birth, contacts, force
       !> Displacement of the slider [m], and time [s]
       real(wp), intent(in) :: displacement, time
-      !> Elastic energy, reduced by giving all contacts one origin [J]
+      !> Elastic energy, to which that lost by giving all contacts one origin is added [J]
       real(wp), intent(inout) :: energy
 
       real(wp) :: below(2), part, high, all, level

@@ -4,8 +4,7 @@ module mesoslip_contacts
    use mesoslip_contacts_base, only: contact_parameters_type, contacts_type, take_contact_parameters
    use mesoslip_contacts_ensemble, only: make_contact_ensemble
    use mesoslip_contacts_lattice, only: make_contact_lattice
-   use mesoslip_contacts_populations, only: make_ageing_populations, make_contact_populations, &
-      & make_thermal_ageing_populations, make_thermal_populations
+   use mesoslip_contacts_populations, only: make_contact_populations
    use mesoslip_contacts_thermal_ageing, only: make_thermal_ageing_contacts
    use mesoslip_contacts_thermal_contacts, only: make_thermal_contacts
    use mesoslip_numerics_errors, only: error_type, raise, status_invalid
@@ -39,21 +38,21 @@ contains
       case ("ageing")
          call make_contact_ageing(contacts, common, parameters, error)
       case ("ageing populations")
-         call make_ageing_populations(contacts, common, parameters, error)
+         call make_contact_populations(contacts, common, parameters, .true., .false., error)
       case ("ensemble")
          call make_contact_ensemble(contacts, common, parameters, error)
       case ("lattice")
          call make_contact_lattice(contacts, common, parameters, error)
       case ("populations")
-         call make_contact_populations(contacts, common, parameters, error)
+         call make_contact_populations(contacts, common, parameters, .false., .false., error)
       case ("thermal")
          call make_thermal_contacts(contacts, common, parameters, error)
       case ("thermal ageing")
          call make_thermal_ageing_contacts(contacts, common, parameters, error)
       case ("thermal ageing populations")
-         call make_thermal_ageing_populations(contacts, common, parameters, error)
+         call make_contact_populations(contacts, common, parameters, .true., .true., error)
       case ("thermal populations")
-         call make_thermal_populations(contacts, common, parameters, error)
+         call make_contact_populations(contacts, common, parameters, .false., .true., error)
       case default
          call raise(error, status_invalid, "unknown kind of contacts '" // kind // "'")
       end select

@@ -1,4 +1,4 @@
-!> Infinitely many contacts: the master equation under a slider that moves as it likes.
+!> Infinitely many contacts: the master equation under a slider with any motion.
 !>
 !> Contacts are populations while they are pinned, and packets while they are detached.
 module mesoslip_contacts_populations
@@ -19,25 +19,17 @@ module mesoslip_contacts_populations
    private
 
    public :: contact_populations_type, new_contact_populations, make_contact_populations
-   public :: make_ageing_populations, make_thermal_ageing_populations, make_thermal_populations
 
-   !> Part of the contacts that attach in a step of resolution 1 at most.
+   !> Maximum part of the contacts that attach in a step of resolution 1
    real(wp), parameter :: max_attached_part = 0.1_wp
-   !> Part of a step for which nothing may attach in it. Contacts that break by activation do so in
-   !> every step, and gaps of rounding between steps would come back after each delay.
+   !> Part of a step in which nothing may attach without ending it. Activated contacts break in
+   !> every step, and rounding gaps between steps would return after each delay
    real(wp), parameter :: thermal_gap = 1.0e-3_wp
+
    !> Populations of contacts.
    type, extends(population_state_type) :: contact_populations_type
    contains
-      procedure :: initialize
-      procedure :: offer
-      procedure :: respond
-      procedure :: shift_origin
-      procedure :: elastic_energy
-      procedure :: exchange
-      procedure :: rebuild
-      !> Number of contacts that are pinned
-      procedure :: pinned_count
+      procedure :: initialize, offer, respond, shift_origin, elastic_energy, exchange, rebuild
    end type contact_populations_type
 
 contains
@@ -66,122 +58,43 @@ contains
    end subroutine new_contact_populations
 
    !> Set up populations from named numbers.
-   subroutine make_contact_populations(contacts, common, parameters, error)
-      !> The contacts
+   subroutine make_contact_populations(contacts, common, parameters, ages, is_thermal, error)
       class(contacts_type), allocatable, intent(out) :: contacts
-      !> Parameters that all kinds of contacts have
-      type(contact_parameters_type), intent(in) :: common
-      !> The other number: resolution
-      type(parameters_type), intent(inout) :: parameters
-      !> Set if a number is missing, or the resolution is not positive
-      type(error_type), allocatable, intent(inout) :: error
-
-      type(contact_populations_type), allocatable :: populations
-      real(wp) :: resolution
-
-      call parameters%take("resolution", resolution, error)
-      call parameters%finish(error)
-      if (allocated(error)) return
-      allocate (populations)
-      call new_contact_populations(populations, common, resolution, error)
-      call move_alloc(populations, contacts)
-   end subroutine make_contact_populations
-
-   !> Set up populations whose thresholds change with age from named numbers.
-   subroutine make_ageing_populations(contacts, common, parameters, error)
-      !> The contacts
-      class(contacts_type), allocatable, intent(out) :: contacts
-      !> Parameters that all kinds of contacts have
-      type(contact_parameters_type), intent(in) :: common
-      !> The other numbers: resolution, and the law of ageing
-      type(parameters_type), intent(inout) :: parameters
-      !> Set if a number is missing or wrong
-      type(error_type), allocatable, intent(inout) :: error
-
-      type(contact_populations_type), allocatable :: populations
-      type(contact_parameters_type) :: all
-      type(ageing_law_type) :: ageing
-      real(wp) :: resolution
-
-      all = common
-      call parameters%take("resolution", resolution, error)
-      call take_ageing_law(ageing, all%law, parameters, error)
-      call parameters%finish(error)
-      if (allocated(error)) return
-      allocate (populations)
-      call new_contact_populations(populations, all, resolution, error)
-      if (allocated(error)) return
-      call populations%pinned%set_ageing(ageing)
-      call move_alloc(populations, contacts)
-   end subroutine make_ageing_populations
-
-   !> Set up populations that break by thermal activation from named numbers.
-   subroutine make_thermal_populations(contacts, common, parameters, error)
-      !> The contacts
-      class(contacts_type), allocatable, intent(out) :: contacts
-      !> Parameters that all kinds of contacts have
-      type(contact_parameters_type), intent(in) :: common
-      !> The other numbers: resolution, rate and force of activation
-      type(parameters_type), intent(inout) :: parameters
-      !> Set if a number is missing or wrong
-      type(error_type), allocatable, intent(inout) :: error
-
-      type(contact_populations_type), allocatable :: populations
-      real(wp) :: resolution
-
-      call parameters%take("resolution", resolution, error)
-      if (allocated(error)) return
-      allocate (populations)
-      call new_contact_populations(populations, common, resolution, error)
-      if (allocated(error)) return
-      call activate(populations, parameters, error)
-      if (allocated(error)) return
-      call move_alloc(populations, contacts)
-   end subroutine make_thermal_populations
-
-   !> Set up populations whose thresholds change with age, and that break by thermal activation,
-   !> from named numbers.
-   subroutine make_thermal_ageing_populations(contacts, common, parameters, error)
-      !> The contacts
-      class(contacts_type), allocatable, intent(out) :: contacts
-      !> Parameters that all kinds of contacts have
       type(contact_parameters_type), intent(in) :: common
       !> The other numbers: resolution, the law of ageing, rate and force of activation
       type(parameters_type), intent(inout) :: parameters
-      !> Set if a number is missing or wrong
+      !> Whether thresholds change with age, and whether contacts break by thermal activation
+      logical, intent(in) :: ages, is_thermal
       type(error_type), allocatable, intent(inout) :: error
 
-      type(contact_populations_type), allocatable :: populations
+      type(contact_populations_type), allocatable :: self
       type(contact_parameters_type) :: all
       type(ageing_law_type) :: ageing
-      real(wp) :: resolution
+      real(wp) :: resolution, rate, force
 
       all = common
       call parameters%take("resolution", resolution, error)
-      call take_ageing_law(ageing, all%law, parameters, error)
-      if (allocated(error)) return
-      allocate (populations)
-      call new_contact_populations(populations, all, resolution, error)
-      if (allocated(error)) return
-      call populations%pinned%set_ageing(ageing)
-      call activate(populations, parameters, error)
-      if (allocated(error)) return
-      call move_alloc(populations, contacts)
-   end subroutine make_thermal_ageing_populations
-
-   !> Let populations break by thermal activation.
-   subroutine activate(self, parameters, error)
-      type(contact_populations_type), intent(inout) :: self
-      !> The last numbers: rate and force of activation
-      type(parameters_type), intent(inout) :: parameters
-      type(error_type), allocatable, intent(inout) :: error
-
-      real(wp) :: rate, force
-
-      call parameters%take("activation_rate", rate, error)
-      call parameters%take("activation_force", force, error)
+      if (ages) call take_ageing_law(ageing, all%law, parameters, error)
+      if (is_thermal) then
+         call parameters%take("activation_rate", rate, error)
+         call parameters%take("activation_force", force, error)
+      end if
       call parameters%finish(error)
       if (allocated(error)) return
+      allocate (self)
+      call new_contact_populations(self, all, resolution, error)
+      if (allocated(error)) return
+      if (ages) call self%pinned%set_ageing(ageing)
+      if (is_thermal) call activate(self, rate, force, error)
+      call move_alloc(self, contacts)
+   end subroutine make_contact_populations
+
+   !> Let populations break by thermal activation, with its rate [1/s] and force [N].
+   subroutine activate(self, rate, force, error)
+      type(contact_populations_type), intent(inout) :: self
+      real(wp), intent(in) :: rate, force
+      type(error_type), allocatable, intent(inout) :: error
+
       if (.not. (rate > 0.0_wp .and. force > 0.0_wp &
          & .and. self%parameters%coupling == coupling_equal)) then
          call raise(error, status_invalid, "activation needs equal contacts, and a positive rate " &
@@ -199,7 +112,6 @@ contains
       call self%pinned%initialize(state, self%failure)
    end subroutine initialize
 
-   !> Contact force as a law, and where it holds: until contacts break, or for a step.
    subroutine offer(self, pose, law, window)
       class(contact_populations_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
@@ -218,20 +130,10 @@ contains
 
    subroutine shift_origin(self, shift, displacement)
       class(contact_populations_type), intent(inout) :: self
-      real(wp), intent(in) :: shift
-      real(wp), intent(in) :: displacement
+      real(wp), intent(in) :: shift, displacement
 
       call self%pinned%shift_origin(shift)
    end subroutine shift_origin
-
-   !> Number of contacts that are pinned.
-   pure function pinned_count(self) result(total)
-      class(contact_populations_type), intent(in) :: self
-      !> Their number, in the mean of what it may be
-      real(wp) :: total
-
-      total = self%pinned%number_of_contacts()
-   end function pinned_count
 
    pure function elastic_energy(self, displacement) result(energy)
       class(contact_populations_type), intent(in) :: self
@@ -255,7 +157,6 @@ contains
       call archive%exchange("excess", self%excess)
    end subroutine exchange
 
-   !> Nothing is derived from the state: all of it is in the archive.
    subroutine rebuild(self, displacement)
       class(contact_populations_type), intent(inout) :: self
       real(wp), intent(in) :: displacement

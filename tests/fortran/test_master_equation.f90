@@ -181,8 +181,8 @@ contains
          before = after
       end do
       call check(step < 20000, "the displacement takes so many steps")
-      call check_close(contacts%pinned_count() + contacts%detached_count, 1.0_wp, &
-         & 1.0e-12_wp, "contacts are conserved")
+      call check_close(contacts%pinned%number_of_contacts() + contacts%detached_count, &
+         & 1.0_wp, 1.0e-12_wp, "contacts are conserved")
       call check(contacts%breaks > 2.5_wp, "contacts break")
       call check_close(contacts%elastic_energy(before%displacement) - start, &
          & work - contacts%break_loss%total() + contacts%birth_gain%total() &

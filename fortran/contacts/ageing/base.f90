@@ -67,7 +67,7 @@ module mesoslip_contacts_ageing_base
       type(contact_queue_type) :: queue
       !> Numbers of the next lives, shape (next_length, count)
       real(wp), allocatable :: next(:, :)
-      !> Contacts of which the next limit is to be solved
+      !> Contacts whose next limits are to be solved
       integer :: unsolved_count = 0, unsolved(solved_together) = 0
       !> One array, because gfortran 12 frees only one of several components of this type
       type(list_type) :: list(lists)

@@ -41,7 +41,7 @@ contains
                & pose%time - self%life(life_birth, contact), limit, rate)
             fastest = max(fastest, -rate)
          end do
-         ! Then a scan is about as frequent, in a stretch, as contacts are near.
+         ! While the slider moves by a stretch, there are about as many scans as near contacts.
          reach = 0.5_wp * self%stretch / sqrt(real(self%list(falling)%count, wp))
          self%scan_upper = self%direction * pose%displacement + reach
          self%scan_lower = self%direction * pose%displacement - reach

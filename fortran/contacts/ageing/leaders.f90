@@ -112,7 +112,7 @@ contains
       call self%count_visits(number)
    end subroutine gather
 
-   !> Add a leader; they are in decreasing order of their keys.
+   !> Add a contact to the leaders, which are in decreasing order of their keys.
    subroutine add_leader(self, contact)
       class(ageing_contacts_type), intent(inout) :: self
       integer, intent(in) :: contact

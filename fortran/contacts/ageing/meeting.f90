@@ -26,7 +26,7 @@ module mesoslip_contacts_ageing_meeting
    real(wp), parameter :: max_bend = 0.2_wp
    !> Relative size of a step of Newton's method after which the error is below rounding
    real(wp), parameter :: max_newton_step = 1.0e-8_wp
-   !> Maximum number of steps; so many are needed only where a contact just does not break
+   !> Maximum number of steps, which is reached only where a contact just does not break
    integer, parameter :: max_iterations = 60
 
 contains

@@ -122,8 +122,6 @@ contains
    end function newborn_limit
 
    !> Have the next limit of a contact solved with those of others.
-
-   !> Have the next life of a contact solved with those of others.
    subroutine solve_later(self, contact)
       class(ageing_contacts_type), intent(inout) :: self
       integer, intent(in) :: contact

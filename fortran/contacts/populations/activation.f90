@@ -1,10 +1,10 @@
-!> Thermal activation of populations: how the level of a population grows while the slider moves.
+!> Thermal activation of populations: how their levels increase while the slider moves.
 !>
 !> A contact under the force g breaks at the rate omega_0 exp((abs(g) - u)/theta), in units of f_s
-!> and theta = f_T/f_s. The integral over the time is exp((e - u)/theta) with the level e, a number
-!> of its population. Populations whose forces have one sign share the integral of exp(x/theta)
-!> over the motion x of the slider. All is relative to where the slider was: there are no exponents
-!> but of differences of forces in a step.
+!> with theta = f_T/f_s. The integral over the time is exp((e - u)/theta) with the level e of its
+!> population. Populations whose forces have one sign share the integral of exp(x/theta) over the
+!> motion x of the slider. All is relative to the start of the motion, so that exponents are only
+!> differences of forces in a step.
 module mesoslip_contacts_populations_activation
    use mesoslip_contacts_populations_motion, only: position_at
    use mesoslip_contacts_populations_survivors, only: no_level
@@ -18,10 +18,10 @@ module mesoslip_contacts_populations_activation
 
    !> Points of the rule over a motion
    integer, parameter :: points = 12
-   !> Exponent of a force that is none
+   !> Exponent of a negligible force
    real(wp), parameter :: tiny_exponent = 1.0e-6_wp
 
-   !> How populations are activated.
+   !> Parameters of activation.
    type :: activation_type
       !> Rate of breaking at the threshold [1/s], and f_T/f_s
       real(wp) :: rate = 0.0_wp, width = 1.0_wp
@@ -29,24 +29,18 @@ module mesoslip_contacts_populations_activation
       real(wp), private :: stretch = 1.0_wp
       real(wp), private :: point(points) = 0.0_wp, weight(points) = 0.0_wp
    contains
-      !> Increase of levels in a motion
-      procedure, non_overridable :: growth
-      !> Increase of a level in a motion, the level after it, and after a time under a force
-      procedure, non_overridable :: added
-      procedure, non_overridable :: level_after
-      procedure, non_overridable :: newborn_level
+      procedure, non_overridable :: growth, added, level_after, newborn_level
    end type activation_type
 
    !> Increase of the levels of populations in a motion of the slider, over its force at the start.
    type :: growth_type
-      !> Of those under positive force, and under negative force
+      !> Under positive force, and under negative force
       real(wp), private :: level(2) = no_level
-      !> Of those under no force, if the slider rested
+      !> Under no force, if the slider rested
       real(wp), private :: rest = no_level
-      !> Mean time of the hazard in the motion, over its duration, of the first two
+      !> Mean time of the hazard over the duration, under positive and negative force
       real(wp), private :: time(2) = 0.5_wp
    contains
-      !> Mean time of the hazard
       procedure, non_overridable :: mean_time
    end type growth_type
 
@@ -56,7 +50,6 @@ contains
    pure function new_activation(rate, width, stretch) result(self)
       !> Rate of breaking at the threshold [1/s], f_T/f_s, and f_s/k [m]
       real(wp), intent(in) :: rate, width, stretch
-      !> How populations are activated
       type(activation_type) :: self
 
       self%rate = rate
@@ -68,35 +61,32 @@ contains
    !> Increase of levels in a motion.
    pure function growth(self, before, after)
       class(activation_type), intent(in) :: self
-      !> Pose of the slider before the motion, and after it
       type(pose_type), intent(in) :: before, after
-      !> The increase
       type(growth_type) :: growth
 
-      real(wp) :: duration, exponent(points), hazard(points), place, most, sign
+      real(wp) :: duration, exponent(points), hazard(points), position, max_exponent, sign
       integer :: node, one
 
       duration = after%time - before%time
       if (.not. self%rate * duration > 0.0_wp) return
       growth%rest = self%width * log(self%rate * duration)
       do node = 1, points
-         place = position_at(before, after, before%time + self%point(node) * duration)
-         exponent(node) = (place - before%displacement) / (self%stretch * self%width)
+         position = position_at(before, after, before%time + self%point(node) * duration)
+         exponent(node) = (position - before%displacement) / (self%stretch * self%width)
       end do
       sign = 1.0_wp
       do one = 1, 2
-         most = maxval(sign * exponent)
-         hazard = self%weight * exp(sign * exponent - most)
-         growth%level(one) = growth%rest + self%width * (most + log(sum(hazard)))
+         max_exponent = maxval(sign * exponent)
+         hazard = self%weight * exp(sign * exponent - max_exponent)
+         growth%level(one) = growth%rest + self%width * (max_exponent + log(sum(hazard)))
          growth%time(one) = sum(hazard * self%point) / sum(hazard)
          sign = -1.0_wp
       end do
    end function growth
 
-   !> Mean time of the hazard in a motion, over its duration.
+   !> Mean time of the hazard over the duration of a motion, given the forces before and after.
    elemental function mean_time(self, start_force, end_force) result(time)
       class(growth_type), intent(in) :: self
-      !> Forces on the contacts before and after
       real(wp), intent(in) :: start_force, end_force
       real(wp) :: time
 
@@ -106,12 +96,10 @@ contains
       end if
    end function mean_time
 
-   !> Increase of the level of a population in a motion.
+   !> Increase of the level of a population in a motion, given the forces before and after.
    elemental function added(self, growth, start_force, end_force) result(more)
       class(activation_type), intent(in) :: self
-      !> The increase
       type(growth_type), intent(in) :: growth
-      !> Forces on the contacts before and after
       real(wp), intent(in) :: start_force, end_force
       real(wp) :: more
 
@@ -131,12 +119,10 @@ contains
       end if
    end function added
 
-   !> Level of a population after a motion.
+   !> Level of a population after a motion, given the level before and the forces before and after.
    elemental function level_after(self, growth, level, start_force, end_force) result(after)
       class(activation_type), intent(in) :: self
-      !> The increase
       type(growth_type), intent(in) :: growth
-      !> Level before it, and forces on the contacts before and after
       real(wp), intent(in) :: level, start_force, end_force
       real(wp) :: after
 
@@ -150,10 +136,9 @@ contains
       after = max(level, more) + self%width * log(1.0_wp + exp(-abs(level - more) / self%width))
    end function level_after
 
-   !> Level of contacts that have attached a time ago.
+   !> Level of contacts a time [s] after they attached, under a force.
    elemental function newborn_level(self, duration, force) result(level)
       class(activation_type), intent(in) :: self
-      !> The time [s], and the force on them
       real(wp), intent(in) :: duration, force
       real(wp) :: level
 

@@ -1,14 +1,13 @@
-!> Breaks of pinned populations until the slider comes to a displacement.
+!> Breaks of pinned populations in a motion of the slider.
 !>
-!> It is tried first: the slider is offered a force by what will break. It breaks when the slider
-!> has come there.
+!> A trial of the motion comes first: the slider is offered a force by what will break. That breaks
+!> when the slider has arrived.
 module mesoslip_contacts_populations_breaking
-   use mesoslip_contacts_populations_survivors, only: no_level
    use mesoslip_contacts_mechanics, only: broken_threshold
    use mesoslip_contacts_populations_rows, only: column_ahead, column_behind, column_birth, &
       & column_broken, column_force, column_law, column_level, column_origin, column_weight, &
-      & compliant, lost, &
-      & massive, moments_length, number, population_rows_type, stiff
+      & compliant, lost, massive, moments_length, number, population_rows_type, stiff
+   use mesoslip_contacts_populations_survivors, only: no_level
    use mesoslip_interface_law, only: pose_type
    use mesoslip_numerics_accumulator, only: accumulator_type
    use mesoslip_numerics_errors, only: error_type, raise, status_memory
@@ -16,36 +15,35 @@ module mesoslip_contacts_populations_breaking
    implicit none
    private
 
-   public :: breaking_populations_type, trial_type, tiny_gap, unresolved_part
+   public :: breaking_populations_type, tiny_gap, unresolved_part
 
-   !> Part of a population that does not break before others of it, and that does not stay behind
-   !> them: what breaks is a difference of numbers with rounding errors, which are to decide nothing
+   !> Part of a population below which its first contacts do not break apart and its last ones do
+   !> not remain: breaks are differences of numbers, and rounding errors must not decide
    real(wp), parameter :: unresolved_part = 1.0e-12_wp
-   !> Populations that are looked at together for one that breaks
+   !> Populations that are searched together for breaks
    integer, parameter :: block = 8
-   !> A gap that counts as none, over the length of a step.
+   !> Negligible gap over the length of a step
    real(wp), parameter :: tiny_gap = 1.0e-6_wp
 
-   !> Breaks until a displacement and time in a direction.
+   !> Trial of a motion to a displacement and time in a direction.
    type :: trial_type
-      !> The displacement [m], time [s] and direction
-      real(wp) :: end = 0.0_wp, time = 0.0_wp, direction = 1.0_wp
-      !> The populations of which contacts break, their forces at attaching along the direction,
-      !> the distances from there, the thresholds below which they will have broken, the levels of
-      !> their hazards, what the moments will be, and twice the energy that is lost; shape (count,
-      !> or more). Of contacts that age and break by activation: what it leaves at nodes.
+      !> Displacement [m], time [s] and direction, and length of the motion [m]
+      real(wp) :: end = 0.0_wp, time = 0.0_wp, direction = 1.0_wp, reach = 0.0_wp
+      !> The populations of which contacts break; their forces at attaching and distances from
+      !> there, both along the direction; after the breaks their broken thresholds, levels and
+      !> moments, and what activation leaves at nodes; and twice the energy that is lost; shape
+      !> (count or more)
       integer :: count = 0
       integer, allocatable :: population(:)
       real(wp), allocatable :: force(:), distance(:), broken(:), level(:), moments(:, :), lost(:)
       real(wp), allocatable :: kept(:, :)
-      !> Breaks, and their mass; work that need not be done for them [J]
-      real(wp) :: breaks = 0.0_wp, mass = 0.0_wp, work = 0.0_wp
-      !> Force at the end that the contacts which break would bear [N], and how far it is [m]
-      real(wp) :: drop = 0.0_wp, reach = 0.0_wp
-      !> Of all these the breaks, work and force of contacts that come to their thresholds; those of
-      !> the others go with the time, not with the displacement
+      !> Sums over the breaks: contacts, mass, work that the breaks save [J], and force that the
+      !> contacts would bear at the end [N]
+      real(wp) :: breaks = 0.0_wp, mass = 0.0_wp, work = 0.0_wp, drop = 0.0_wp
+      !> The same of contacts that reach their thresholds, which break with the displacement; the
+      !> others break with the time
       real(wp) :: cut_breaks = 0.0_wp, cut_work = 0.0_wp, cut_drop = 0.0_wp
-      !> Where the next population breaks [m]
+      !> Displacement at which the next population breaks [m]
       real(wp) :: next = 0.0_wp
    end type trial_type
 
@@ -53,31 +51,22 @@ module mesoslip_contacts_populations_breaking
    type, extends(population_rows_type) :: breaking_populations_type
       !> Maximum displacement in which one population attaches [m]
       real(wp) :: step = 0.0_wp
-      !> Contacts found to break
       type(trial_type) :: trial
    contains
-      !> Find what breaks until the slider comes to a displacement, whether that is known, forget it
-      procedure, non_overridable :: try
-      procedure, non_overridable :: has_tried
-      procedure, non_overridable :: forget_trial
-      !> Break what was found to break
-      procedure, non_overridable :: break_tried
-      procedure, non_overridable :: make_room_to_try
+      procedure, non_overridable :: try, begin_trial, has_tried, forget_trial, break_tried
+      procedure, non_overridable :: gap_ahead
       procedure, non_overridable, private :: list_breaking, find_thresholds, find_moments, &
          & find_left_of_table, sum_breaks, more_lost, remove_empty
    end type breaking_populations_type
 
 contains
 
-   !> Find what breaks until the slider comes to a displacement.
+   !> Find what breaks until the slider reaches a displacement [m] at a time [s].
    subroutine try(self, before, displacement, time, direction, late, onset, error)
       class(breaking_populations_type), intent(inout) :: self
-      !> Pose of the slider
       type(pose_type), intent(in) :: before
-      !> Where it comes to [m] and when [s], and in which direction it goes
       real(wp), intent(in) :: displacement, time, direction
-      !> Breaks of populations that start to break in the displacement, and where most of them do
-      !> so [m]
+      !> Breaks of populations that start to break in the motion, and where most of them do so [m]
       real(wp), intent(out) :: late, onset
       !> Set if there is not enough memory; nothing breaks then
       type(error_type), allocatable, intent(inout) :: error
@@ -88,17 +77,12 @@ contains
       column = merge(column_ahead, column_behind, direction > 0.0_wp)
       late = 0.0_wp
       onset = displacement
-      call self%make_room_to_try(error)
+      call self%begin_trial(before, displacement, time, direction, error)
       if (allocated(error)) return
-      self%trial%end = displacement
-      self%trial%time = time
-      self%trial%direction = direction
-      self%trial%reach = abs(displacement - before%displacement)
       call self%list_breaking(displacement, direction, column, self%trial%count, next)
       self%trial%next = direction * next
 
-      ! Thresholds of all first, then moments, then losses: those of one do not wait for those of
-      ! another.
+      ! Each for all populations, so that one does not wait for the results of another.
       call self%find_thresholds()
       call self%find_moments()
       call self%sum_breaks(before, column, late, onset)
@@ -108,7 +92,7 @@ contains
       end if
    end subroutine try
 
-   !> Forces, distances and thresholds of what breaks.
+   !> Forces, distances and broken thresholds of the populations that break.
    subroutine find_thresholds(self)
       class(breaking_populations_type), intent(inout) :: self
 
@@ -136,7 +120,7 @@ contains
       end associate
    end subroutine find_thresholds
 
-   !> Moments of what stays pinned.
+   !> Moments of the contacts that remain pinned.
    subroutine find_moments(self)
       class(breaking_populations_type), intent(inout) :: self
 
@@ -159,11 +143,10 @@ contains
       end associate
    end subroutine find_moments
 
-   !> Moments of what stays pinned of contacts with the stiffnesses of a table.
+   !> The same for contacts with the stiffnesses of a table, after a distance along the direction.
    pure subroutine find_left_of_table(self, row, distance, moments)
       class(breaking_populations_type), intent(in) :: self
       integer, intent(in) :: row
-      !> From the origin along the direction
       real(wp), intent(in) :: distance
       real(wp), intent(out) :: moments(moments_length)
 
@@ -181,23 +164,18 @@ contains
       end associate
    end subroutine find_left_of_table
 
-   !> Sums over what breaks: contacts, mass, work and force.
+   !> Sums over the breaks; the column is that of the direction.
    subroutine sum_breaks(self, before, column, late, onset)
       class(breaking_populations_type), intent(inout) :: self
-      !> Pose of the slider
       type(pose_type), intent(in) :: before
-      !> The column that is about the direction
       integer, intent(in) :: column
-      !> See try
-      real(wp), intent(out) :: late, onset
+      real(wp), intent(inout) :: late, onset
 
       real(wp) :: loss(moments_length), distance, force, max_breaks, edge, breaks, mass, work, drop
       integer :: row, one
 
       associate (trial => self%trial)
-         late = 0.0_wp
          max_breaks = 0.0_wp
-         onset = trial%end
          edge = trial%direction * before%displacement + tiny_gap * self%step
          breaks = 0.0_wp
          mass = 0.0_wp
@@ -235,13 +213,13 @@ contains
       end associate
    end subroutine sum_breaks
 
-   !> Energy of the contacts of a population that break, beyond that of their configured thresholds:
-   !> twice that of each of them in the mean, if the force at which they break is a line over those.
+   !> Energy of the contacts of a population that break beyond that of their configured thresholds,
+   !> twice the mean over them, if the force at breaking is linear in these thresholds.
    pure function more_lost(self, before, row, last, last_force) result(energy)
       class(breaking_populations_type), intent(in) :: self
       type(pose_type), intent(in) :: before
       integer, intent(in) :: row
-      !> Threshold below which they will have broken, and the force then
+      !> Configured threshold below which contacts break, and the force then
       real(wp), intent(in) :: last, last_force
       real(wp) :: energy
 
@@ -262,43 +240,50 @@ contains
          & + (last_force**2 - last**2)) / 3.0_wp
    end function more_lost
 
-   !> Make room for a trial of all populations.
-   subroutine make_room_to_try(self, error)
+   !> Begin a trial: make room for all populations, and set its motion.
+   subroutine begin_trial(self, before, displacement, time, direction, error)
       class(breaking_populations_type), intent(inout) :: self
+      type(pose_type), intent(in) :: before
+      real(wp), intent(in) :: displacement, time, direction
       !> Set if there is not enough memory; the trial is empty then
       type(error_type), allocatable, intent(inout) :: error
 
       integer :: rows, stat
 
+      stat = 0
       rows = size(self%population, 1)
       if (allocated(self%trial%population)) then
-         if (size(self%trial%population) == rows) return
+         if (size(self%trial%population) /= rows) self%trial = trial_type()
       end if
-      self%trial = trial_type()
       associate (trial => self%trial)
-         allocate (trial%population(rows), stat=stat)
-         if (stat == 0) allocate (trial%force(rows), stat=stat)
-         if (stat == 0) allocate (trial%distance(rows), stat=stat)
-         if (stat == 0) allocate (trial%broken(rows), stat=stat)
-         if (stat == 0) allocate (trial%level(rows), source=no_level, stat=stat)
-         if (stat == 0) allocate (trial%moments(moments_length, rows), stat=stat)
-         if (stat == 0) allocate (trial%lost(rows), stat=stat)
-         if (stat == 0 .and. allocated(self%kept)) then
-            allocate (trial%kept(size(self%kept, 1), rows), stat=stat)
+         if (.not. allocated(trial%population)) then
+            allocate (trial%population(rows), stat=stat)
+            if (stat == 0) allocate (trial%force(rows), stat=stat)
+            if (stat == 0) allocate (trial%distance(rows), stat=stat)
+            if (stat == 0) allocate (trial%broken(rows), stat=stat)
+            if (stat == 0) allocate (trial%level(rows), source=no_level, stat=stat)
+            if (stat == 0) allocate (trial%moments(moments_length, rows), stat=stat)
+            if (stat == 0) allocate (trial%lost(rows), stat=stat)
+            if (stat == 0 .and. allocated(self%kept)) then
+               allocate (trial%kept(size(self%kept, 1), rows), stat=stat)
+            end if
          end if
+         trial%end = displacement
+         trial%time = time
+         trial%direction = direction
+         trial%reach = abs(displacement - before%displacement)
       end associate
       if (stat == 0) return
       self%trial = trial_type()
       call raise(error, status_memory, "not enough memory for the populations of contacts")
-   end subroutine make_room_to_try
+   end subroutine begin_trial
 
-   !> List the populations of which contacts break until the slider comes to a displacement.
+   !> List the populations of which contacts break until the slider reaches a displacement [m].
    subroutine list_breaking(self, displacement, direction, column, listed, next)
       class(breaking_populations_type), intent(inout) :: self
-      !> Where the slider comes to [m], in which direction, and the column of this direction
       real(wp), intent(in) :: displacement, direction
       integer, intent(in) :: column
-      !> How many they are, and the coordinate along the direction where the next one breaks [m]
+      !> Their number, and the coordinate along the direction at which the next one breaks [m]
       integer, intent(out) :: listed
       real(wp), intent(out) :: next
 
@@ -311,7 +296,7 @@ contains
       here = direction * displacement
       do first = 1, self%count, block
          if (first + block - 1 <= self%count) then
-            ! Of most blocks no population breaks.
+            ! In most blocks no population breaks.
             associate (position => self%population(first:first + block - 1, column))
                nearest_of = min(direction * position(:4), direction * position(5:))
             end associate
@@ -321,8 +306,8 @@ contains
                cycle
             end if
          end if
-         ! In the others which ones do is as good as random: they are listed without a branch.
-         ! Contacts whose thresholds fall may break while the slider rests.
+         ! In the others breaks are as good as random: they are listed without a branch. Contacts
+         ! whose thresholds fall may break while the slider rests.
          do row = first, min(first + block - 1, self%count)
             coordinate = direction * self%population(row, column)
             breaks = coordinate < here .or. (self%some_fall .and. .not. coordinate > here)
@@ -333,19 +318,27 @@ contains
       end do
    end subroutine list_breaking
 
-   !> Whether it is known what breaks until the slider is at a displacement at a time.
+   !> Distance of the slider at a displacement to the next break in a direction [m].
+   pure function gap_ahead(self, displacement, direction) result(gap)
+      class(breaking_populations_type), intent(in) :: self
+      real(wp), intent(in) :: displacement, direction
+      real(wp) :: gap
+
+      gap = merge(self%ahead - displacement, displacement - self%behind, direction > 0.0_wp)
+   end function gap_ahead
+
+   !> Whether the trial is that of a displacement [m] and a time [s], which matters only with
+   !> ageing.
    pure function has_tried(self, displacement, time)
       class(breaking_populations_type), intent(in) :: self
-      !> The displacement [m] and the time [s], on which it depends only if thresholds do
       real(wp), intent(in) :: displacement, time
-      !> Whether it is
       logical :: has_tried
 
       has_tried = self%trial%count > 0 .and. .not. abs(self%trial%end - displacement) > 0.0_wp
       if (self%ages) has_tried = has_tried .and. .not. abs(self%trial%time - time) > 0.0_wp
    end function has_tried
 
-   !> Forget what was found to break.
+   !> Make the trial one of no breaks.
    pure subroutine forget_trial(self)
       class(breaking_populations_type), intent(inout) :: self
 
@@ -355,17 +348,16 @@ contains
       self%trial%mass = 0.0_wp
    end subroutine forget_trial
 
-   !> Break what was found to break.
+   !> Break what breaks in the trial, and add the elastic energy lost [J].
    subroutine break_tried(self, break_loss)
       class(breaking_populations_type), intent(inout) :: self
-      !> Elastic energy lost by breaking [J]
       type(accumulator_type), intent(inout) :: break_loss
 
       type(accumulator_type) :: stiffness, offset, energy
       real(wp) :: loss(moments_length), ahead, behind
       integer :: trial, row
 
-      ! In variables of their own, which stay in registers: each break waits for the one before.
+      ! Local, so that they stay in registers: each break waits for the one before.
       stiffness = self%stiffness
       offset = self%offset
       energy = break_loss
@@ -377,7 +369,7 @@ contains
          behind = self%trial%next
       end if
       associate (population => self%population, parameters => self%parameters)
-         ! The last population takes the row of one that is removed: it has had its turn.
+         ! The last population, already done, takes the row of one that is removed.
          do trial = self%trial%count, 1, -1
             row = self%trial%population(trial)
             loss = self%left(:, row) - self%trial%moments(:, trial)
@@ -420,7 +412,7 @@ contains
       end if
    end subroutine break_tried
 
-   !> Remove populations of which no contact is left; the others keep their order.
+   !> Remove populations without contacts; the others keep their order.
    subroutine remove_empty(self)
       class(breaking_populations_type), intent(inout) :: self
 

@@ -1,13 +1,12 @@
 !> Survival of contacts whose thresholds change with age under thermal activation, by threshold.
 !>
-!> A contact of the configured threshold u has the threshold a + b u at an age, with a and b that
-!> are those of its population. Its integrated hazard is a sum of exp((f - a - b u)/theta) over the
-!> life: with b constant it would be exp((e - b u)/theta) with one level e of the population, but as
-!> b changes, hazards of two thresholds have no ratio that stays. So a population keeps the part
-!> that is left of its contacts at the nodes of Gauss-Legendre rules in panels over the thresholds.
-!> Panels are so short that both the law and the hazard are smooth in them: where contacts below
-!> some threshold have broken, the rest of its panel is integrated by the polynomial through the
-!> nodes.
+!> A contact of the configured threshold u has the threshold a + b u at an age, with a and b of its
+!> population. Its integrated hazard is a sum of exp((f - a - b u)/theta) over the life: with b
+!> constant it would be exp((e - b u)/theta) with one level e of the population, but as b changes,
+!> the ratio of the hazards of two thresholds changes too. So a population keeps the surviving part
+!> of its contacts at the nodes of Gauss-Legendre rules in panels over the thresholds. Panels are so
+!> short that both the law and the hazard are smooth in them. Where contacts up to a threshold have
+!> broken, the remainder of its panel is integrated by the polynomial through the nodes.
 module mesoslip_contacts_populations_nodes
    use mesoslip_contacts_ageing_law, only: ageing_law_type
    use mesoslip_contacts_partial_moments, only: partial_moments_type
@@ -24,16 +23,17 @@ module mesoslip_contacts_populations_nodes
 
    !> Nodes of a panel
    integer, parameter :: points = 8
-   !> Panels over the range of the law at least, and length of a panel over theta and the factor b
-   !> of contacts that are old
+   !> Minimum number of panels over the range of the law, maximum length of a panel over theta
+   !> divided by the factor b of old contacts, and age of these over that of ageing
    integer, parameter :: law_panels = 10
    real(wp), parameter :: panel_length = 2.0_wp, old_age = 1.0e4_wp
    !> Probability that a threshold is outside of the panels, on either side
    real(wp), parameter :: outside = 1.0e-13_wp
-   !> Logarithms of a hazard that counts as none, and of one that breaks all
+   !> Logarithms of a negligible hazard, and of one that breaks all contacts
    real(wp), parameter :: no_hazard = -32.0_wp, max_exponent = 5.0_wp
-   !> Change of thresholds in a step over theta up to which it enters at one time; changes in the
-   !> parts of a step where it is larger, their nodes, and those of a step of small changes
+   !> Changes of thresholds in a step over theta: up to which they are those at one time, up to
+   !> which the rule is short, and in each part of a larger change; maximum number of parts, and
+   !> nodes of the rules
    real(wp), parameter :: max_change = 0.1_wp, change_of_part = 1.5_wp, small_change = 0.5_wp
    integer, parameter :: max_parts = 40, times = 4, short_times = 2
 
@@ -43,41 +43,33 @@ module mesoslip_contacts_populations_nodes
       integer :: count = 0
       !> f_T/f_s, and one over it
       real(wp), private :: width = 1.0_wp, inverse_width = 1.0_wp
-      !> How thresholds age, and a threshold for which that is resolved
+      !> How thresholds age, and a configured threshold for which changes are resolved
       type(ageing_law_type), private :: ageing
       real(wp), private :: typical = 1.0_wp
       !> Edges of the panels, in the coordinate of the law
       type(threshold_coordinate_type), private :: coordinate
       real(wp), allocatable, private :: edge(:)
-      !> Thresholds of the nodes, density times length of the panel, and the share of contacts;
+      !> Thresholds of the nodes, density times length of the panel, shares of contacts, and sums of
       !> shares from each panel on
       real(wp), allocatable, private :: threshold(:), density(:), share(:), shares_from(:)
       !> Legendre's polynomials at the nodes of a panel with the weights of its rule
       real(wp), private :: basis(points, points) = 0.0_wp
-      !> Nodes and weights over the time of a part of a step, of two orders
+      !> Nodes and weights over the time of a part of a step, and of the short rule
       real(wp), private :: time(times) = 0.0_wp, weight(times) = 0.0_wp
       real(wp), private :: short_time(short_times) = 0.0_wp, short_weight(short_times) = 0.0_wp
    contains
-      !> How many contacts are left
-      procedure, non_overridable :: left
-      !> Fraction that survives a motion, and a time after attaching
-      procedure, non_overridable :: pass
-      procedure, non_overridable :: pass_newborn
+      procedure, non_overridable :: left, pass, pass_newborn
       procedure, non_overridable, private :: place_panels, panel_of, break_some, pass_ages
    end type threshold_nodes_type
 
 contains
 
-   !> Place nodes over the thresholds of a law.
+   !> Place nodes over the configured thresholds of a law, for the width f_T/f_s.
    subroutine new_threshold_nodes(self, law, moments, ageing, width)
       type(threshold_nodes_type), intent(out) :: self
-      !> The law of configured thresholds
       class(threshold_law_type), intent(in) :: law
-      !> Its partial moments
       type(partial_moments_type), intent(in) :: moments
-      !> How thresholds age
       type(ageing_law_type), intent(in) :: ageing
-      !> f_T/f_s
       real(wp), intent(in) :: width
 
       real(wp) :: point(points), weight(points), place, length, x
@@ -145,7 +137,7 @@ contains
       end do
    end subroutine place_panels
 
-   !> Legendre's polynomial.
+   !> Legendre's polynomial of a degree.
    pure function legendre(degree, x) result(value)
       integer, intent(in) :: degree
       real(wp), intent(in) :: x
@@ -163,10 +155,9 @@ contains
       end do
    end function legendre
 
-   !> The panel of a threshold, the first or last one if it is outside.
+   !> Panel of a threshold in the coordinate of the law, the first or last one if it is outside.
    pure function panel_of(self, place) result(panel)
       class(threshold_nodes_type), intent(in) :: self
-      !> The threshold in the coordinate of the law
       real(wp), intent(in) :: place
       integer :: panel
 
@@ -184,15 +175,12 @@ contains
       end do
    end function panel_of
 
-   !> How many contacts are left.
+   !> Surviving number of the contacts that activation would leave unbroken, given the configured
+   !> threshold up to which contacts broke at once, and the surviving part at each node.
    pure function left(self, broken, kept, number)
       class(threshold_nodes_type), intent(in) :: self
-      !> Configured threshold at or below which contacts broke at once
-      real(wp), intent(in) :: broken
-      !> Part that activation leaves at each node
+      real(wp), intent(in) :: broken, number
       real(wp), intent(in), contiguous :: kept(:)
-      !> Number without activation
-      real(wp), intent(in) :: number
       real(wp) :: left
 
       real(wp) :: place, x, part(points), value(0:points), all, some
@@ -230,19 +218,16 @@ contains
       if (all > 0.0_wp) left = number * max(0.0_wp, min(1.0_wp, some / all))
    end function left
 
-   !> Fraction of the contacts of a population that survives a motion.
+   !> Surviving part at each node after a motion of the slider.
    subroutine pass(self, activation, growth, before, after, birth, force, broken, kept)
       class(threshold_nodes_type), intent(in) :: self
-      !> How contacts are activated, and what the motion adds to levels
       type(activation_type), intent(in) :: activation
+      !> Increase of levels in the motion
       type(growth_type), intent(in) :: growth
-      !> Pose of the slider before the motion, and after it
       type(pose_type), intent(in) :: before, after
-      !> When the contacts attached [s], and the forces on them before and after
-      real(wp), intent(in) :: birth, force(2)
-      !> Configured threshold at or below which they have broken
-      real(wp), intent(in) :: broken
-      !> Part that is left at each node
+      !> Time of attaching [s], forces before and after, and configured threshold up to which
+      !> contacts have broken
+      real(wp), intent(in) :: birth, force(2), broken
       real(wp), intent(inout), contiguous :: kept(:)
 
       real(wp) :: ages(2), age, mean(2), factor(2), change
@@ -256,7 +241,7 @@ contains
       if (change > max_change) then
          call self%pass_ages(activation%rate, ages, force, change, broken, kept)
       else
-         ! At the time at which most of the hazard comes.
+         ! With the thresholds at the mean time of the hazard.
          age = ages(1) + growth%mean_time(force(1), force(2)) * (ages(2) - ages(1))
          call line_at(self%ageing, age, mean(1), factor(1))
          call self%break_some([(activation%added(growth, force(1), force(2)) - mean(1)) &
@@ -264,12 +249,11 @@ contains
       end if
    end subroutine pass
 
-   !> Fraction of contacts that survives the time since they attached.
+   !> Surviving part at each node a time [s] after attaching, under a force.
    subroutine pass_newborn(self, rate, duration, force, kept)
       class(threshold_nodes_type), intent(in) :: self
-      !> Rate of breaking at the threshold [1/s], the time [s], and the force on the contacts
+      !> Rate of breaking at the threshold [1/s]
       real(wp), intent(in) :: rate, duration, force
-      !> Part that is left at each node
       real(wp), intent(out), contiguous :: kept(:)
 
       real(wp) :: mean(2), factor(2)
@@ -282,7 +266,7 @@ contains
          & + self%typical * abs(factor(2) - factor(1))) * self%inverse_width, 0.0_wp, kept)
    end subroutine pass_newborn
 
-   !> Thresholds at an age: a and b of a + b u.
+   !> a and b of the thresholds a + b u at an age.
    pure subroutine line_at(ageing, age, mean, factor)
       type(ageing_law_type), intent(in) :: ageing
       real(wp), intent(in) :: age
@@ -293,14 +277,10 @@ contains
    end subroutine line_at
 
    !> Let contacts break while their thresholds change: a rule over the logarithm of the age, under
-   !> a force that changes evenly in time.
+   !> a force that changes evenly in time. The change is that of thresholds over theta.
    subroutine pass_ages(self, rate, ages, force, change, broken, kept)
       class(threshold_nodes_type), intent(in) :: self
-      !> Rate of breaking at the threshold [1/s]
-      real(wp), intent(in) :: rate
-      !> Ages [s] and forces before and after, and change of thresholds over theta
-      real(wp), intent(in) :: ages(2), force(2), change
-      real(wp), intent(in) :: broken
+      real(wp), intent(in) :: rate, ages(2), force(2), change, broken
       real(wp), intent(inout), contiguous :: kept(:)
 
       real(wp) :: constant(max_parts * times), slope(max_parts * times), logarithm(2), length, more
@@ -327,9 +307,8 @@ contains
 
    contains
 
-      !> Add what comes around an age.
+      !> Add the hazard around an age, given its logarithm minus that before, and its weight.
       subroutine add(place, weight)
-         !> Logarithm of the age from that before, and its weight
          real(wp), intent(in) :: place, weight
 
          real(wp) :: age, f, a, b
@@ -360,7 +339,7 @@ contains
       if (broken > self%threshold(1)) then
          first = (self%panel_of(self%coordinate%at(broken)) - 1) * points + 1
       end if
-      ! The higher the threshold the smaller the hazard.
+      ! The hazard decreases with the threshold.
       end = maxval((constant - no_hazard) / slope)
       if (.not. end > self%threshold(first)) return
       last = points * self%panel_of(self%coordinate%at(end))

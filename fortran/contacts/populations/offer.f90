@@ -1,18 +1,18 @@
-!> The steps of populations: how long they are, and the force that the slider is offered in each.
+!> The steps of populations: their duration, and the force that the slider is offered in each.
 !>
 !> A step is so short that its populations are points of a smooth density of origins, and that an
 !> inertial slider hardly changes its acceleration. In a step the contact force changes with the
-!> displacement by what breaks, and with the time by what attaches: a chord of the true force,
-!> shifted so that it does the true work. Chords of successive steps meet, so that the slider is not
-!> shaken. The steps are of second order.
+!> displacement by breaks, and with the time by attachments: a chord of the true force, shifted so
+!> that it does the true work. Chords of successive steps meet, so that the slider is not shaken.
+!> The steps are of second order.
 module mesoslip_contacts_populations_offer
+   use mesoslip_contacts_populations_breaking, only: tiny_gap
+   use mesoslip_contacts_populations_motion, only: distance_in, max_time, patience, time_after, &
+      & time_to_move
+   use mesoslip_contacts_populations_packets, only: expected_births_type, shorten_step
+   use mesoslip_contacts_populations_state, only: population_state_type
    use mesoslip_contacts_populations_thermal_step, only: expect_motion, look_ahead_thermal, &
       & max_growth, min_part, smooth_excess
-   use mesoslip_contacts_populations_breaking, only: tiny_gap
-   use mesoslip_contacts_populations_motion, only: distance_in, max_time, patience, &
-      & time_to_move
-   use mesoslip_contacts_populations_packets, only: expected_births_type
-   use mesoslip_contacts_populations_state, only: population_state_type
    use mesoslip_interface_law, only: interface_law_type, pose_type, window_type
    use mesoslip_numerics_kinds, only: wp
    implicit none
@@ -20,30 +20,28 @@ module mesoslip_contacts_populations_offer
 
    public :: offer_step
 
-   !> Part of a step's length below which a slider creeps
+   !> Displacement over the length of a step up to which a slider creeps
    real(wp), parameter :: creeping_part = 0.01_wp
-   !> Duration of a step in which a slider may settle, over the time in which it oscillates, per
+   !> Duration of a step in which a slider may settle, over the time in which it oscillates by a
    !> radian
    real(wp), parameter :: settling_time = 8.0_wp
-   !> Part of a step's length by which a slider that hardly oscillates may go back
+   !> Displacement over the length of a step by which a slider that hardly oscillates may go back
    real(wp), parameter :: back_part = 0.1_wp
    !> Part of the force that drives a slider by which a chord may lie above the true force
    real(wp), parameter :: driving_part = 0.5_wp
-   !> Forces that differ by this part are equal up to rounding
+   !> Relative difference of forces up to which they are equal except for rounding
    real(wp), parameter :: rounding = 16.0_wp * epsilon(1.0_wp)
-   !> Duration of a step of resolution 1 over the time in which an inertial slider oscillates, per
+   !> Duration of a step of resolution 1 over the time in which an inertial slider oscillates by a
    !> radian
    real(wp), parameter :: rate_part = 1.0_wp
+
 contains
 
-   !> Contact force as a law, and where it holds: until contacts break, or for a step.
+   !> Contact force as a law, which holds until contacts break, or for a step.
    subroutine offer_step(self, pose, law, window)
       class(population_state_type), intent(inout) :: self
-      !> Pose of the slider
       type(pose_type), intent(in) :: pose
-      !> The law
       type(interface_law_type), intent(out) :: law
-      !> Range in which it holds
       type(window_type), intent(out) :: window
 
       real(wp) :: direction, max_span, span, distance, reach, limit, max_births, slack, growing
@@ -62,10 +60,8 @@ contains
       if (is_quiet) slack = back_part * self%pinned%step
       if (self%pinned%is_thermal) then
          breaks = self%pinned%count > 0
-      else if (direction > 0.0_wp) then
-         breaks = self%pinned%ahead - pose%displacement <= slack
       else
-         breaks = pose%displacement - self%pinned%behind <= slack
+         breaks = self%pinned%gap_ahead(pose%displacement, direction) <= slack
       end if
       rests = is_in_balance(self, pose, slack)
       breaks = breaks .and. .not. rests
@@ -82,7 +78,7 @@ contains
       if (self%pinned%some_fall) self%max_fall_time = time_to_fall(self, pose, span)
       max_span = min(max_span, self%max_fall_time)
       if (self%pinned%is_thermal .and. breaks) then
-         ! As long as that a slider which hardly oscillates may settle.
+         ! Long enough for a slider that hardly oscillates to settle.
          growing = max_growth * min(self%last_duration, max_time)
          if (is_quiet) growing = max(growing, settling_time / self%oscillation_rate(pose))
          max_span = min(max_span, growing)
@@ -106,12 +102,12 @@ contains
       moves = breaks .or. births%number > 0.0_wp
       window%end_time = births%end_time
       if (moves .and. max_span < max_time) then
-         window%end_time = min(window%end_time, max(pose%time + max_span, &
-            & nearest(pose%time, huge(1.0_wp))))
+         window%end_time = min(window%end_time, time_after(pose%time, max_span))
       end if
       ! Contacts may break at rest later on.
-      if (self%max_fall_time < max_time) window%end_time = min(window%end_time, &
-         & max(pose%time + self%max_fall_time, nearest(pose%time, huge(1.0_wp))))
+      if (self%max_fall_time < max_time) then
+         window%end_time = min(window%end_time, time_after(pose%time, self%max_fall_time))
+      end if
       window%upper = max(self%pinned%ahead, pose%displacement)
       window%lower = min(self%pinned%behind, pose%displacement)
       if (moves) then
@@ -134,16 +130,14 @@ contains
       self%offers = .true.
    end subroutine offer_step
 
-   !> Let a window end where a step does, ahead and where the slider turns round.
+   !> End a window with the step: ahead, and where the slider turns round.
    pure subroutine end_at_reach(pose, direction, reach, slack, breaks, is_quiet, window)
-      !> Pose of the slider
       type(pose_type), intent(in) :: pose
-      !> The direction in which it goes, the largest displacement of the step, and by how much a
-      !> slider that rests or hardly oscillates may go back [m]
+      !> Direction, maximum displacement of the step, and distance by which a slider that rests or
+      !> hardly oscillates may go back [m]
       real(wp), intent(in) :: direction, reach, slack
       !> Whether contacts break in the step, and whether the slider hardly oscillates
       logical, intent(in) :: breaks, is_quiet
-      !> The window
       type(window_type), intent(inout) :: window
 
       if (direction > 0.0_wp) then
@@ -159,49 +153,35 @@ contains
       end if
    end subroutine end_at_reach
 
-   !> Find what breaks in a step, and what of that attaches in it; the step may become shorter.
+   !> Find what breaks in a step, and which part of it attaches; the step may become shorter.
    subroutine look_ahead(self, pose, direction, max_births, span, distance, reach, limit, births)
       class(population_state_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
-      !> The direction in which the slider moves, and contacts that may attach in a step
+      !> Direction of the motion, and maximum number of contacts that attach
       real(wp), intent(in) :: direction, max_births
       !> Duration of the step [s], expected displacement in it, displacement until which breaks are
-      !> found, and largest displacement of the step [m]
+      !> found, and maximum displacement of the step [m]
       real(wp), intent(inout) :: span, distance, reach, limit
       type(expected_births_type), intent(inout) :: births
 
-      real(wp) :: part, wanted
+      real(wp) :: part
 
-      wanted = reach
-      call try(self, pose, direction, reach)
-      if (reach < wanted) limit = reach
-      associate (trial => self%pinned%trial)
-         if (reach < distance) call shorten(time_to_move(pose, direction, reach))
+      call try(self, pose, direction, reach, limit)
+      if (reach < distance) then
+         call shorten_step(pose, direction, time_to_move(pose, direction, reach), span, distance, &
+            & births)
+      end if
+      call find_own()
+      if (births%own > 0.0_wp .and. births%number + births%own > max_births) then
+         part = max_births / (births%number + births%own)
+         births%end_time = min(births%end_time, time_after(pose%time, part * span))
+         call shorten_step(pose, direction, part * span, span, distance, births)
+         reach = max(distance, min_part * self%pinned%step)
+         call try(self, pose, direction, reach, limit)
          call find_own()
-         if (births%own > 0.0_wp .and. births%number + births%own > max_births) then
-            part = max_births / (births%number + births%own)
-            births%end_time = min(births%end_time, max(pose%time + part * span, &
-               & nearest(pose%time, huge(1.0_wp))))
-            call shorten(part * span)
-            reach = max(distance, min_part * self%pinned%step)
-            wanted = reach
-            call try(self, pose, direction, reach)
-            if (reach < wanted) limit = reach
-            call find_own()
-         end if
-      end associate
+      end if
 
    contains
-
-      !> Let the step end earlier.
-      subroutine shorten(time)
-         real(wp), intent(in) :: time
-
-         births%number = births%number * time / span
-         births%mass = births%mass * time / span
-         span = time
-         distance = distance_in(pose, direction, span)
-      end subroutine shorten
 
       !> Find what breaks and attaches in the step.
       subroutine find_own()
@@ -216,7 +196,7 @@ contains
 
    end subroutine look_ahead
 
-   !> Time in which the motion does not change much [s].
+   !> Maximum duration of a step in which the motion hardly changes [s].
    pure function max_duration(self, pose) result(duration)
       class(population_state_type), intent(in) :: self
       type(pose_type), intent(in) :: pose
@@ -229,13 +209,12 @@ contains
       if (rate > 1.0_wp / max_time) duration = self%resolution * rate_part / rate
    end function max_duration
 
-   !> Add to a law how the force changes by what breaks and attaches.
+   !> Add to a law the changes of the force by breaks and attachments in a step.
    pure subroutine add_changes(self, pose, direction, span, distance, births, law)
       class(population_state_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
-      real(wp), intent(in) :: direction
-      !> How long the step lasts [s], and how far the slider comes in it [m]
-      real(wp), intent(in) :: span, distance
+      !> Direction, duration of the step [s] and displacement in it [m]
+      real(wp), intent(in) :: direction, span, distance
       type(expected_births_type), intent(in) :: births
       type(interface_law_type), intent(inout) :: law
 
@@ -253,7 +232,7 @@ contains
             heat = trial%drop - trial%cut_drop
             slope = -trial%cut_drop / trial%reach
             ! The true force lies between those of the start and of the end. Contacts that attached
-            ! in the step before may be due already, in no distance at all.
+            ! in the step before may be due at once, at no distance.
             middle = 0.5_wp * trial%cut_drop - trial%cut_work / trial%reach
             middle = max(-0.5_wp * abs(trial%cut_drop), min(0.5_wp * abs(trial%cut_drop), middle))
             mass = mass + (trial%mass - (trial%breaks - trial%cut_breaks)) &
@@ -279,13 +258,11 @@ contains
       end associate
    end subroutine add_changes
 
-   !> Whether a slider is at rest and in balance but for rounding errors: they do not decide in
-   !> which direction contacts break.
+   !> Whether a slider that can come to rest within a distance [m] is in balance except for rounding
+   !> errors: these must not decide in which direction contacts break.
    pure function is_in_balance(self, pose, slack) result(is_balanced)
       class(population_state_type), intent(in) :: self
-      !> Pose of the slider
       type(pose_type), intent(in) :: pose
-      !> Distance in which it may come to rest [m]
       real(wp), intent(in) :: slack
       logical :: is_balanced
 
@@ -299,14 +276,11 @@ contains
          & .and. pose%velocity**2 <= 2.0_wp * noise * slack
    end function is_in_balance
 
-   !> By how much a chord may lie above the true force at its start [N]: a slider that begins to
-   !> move goes on, or it would turn round at once, again and again.
+   !> Maximum height of a chord above the true force at its start [N], in a step with a displacement
+   !> [m]: a slider that begins to move must not turn round at once.
    pure function max_shift(pose, direction, distance) result(force)
-      !> Pose of the slider
       type(pose_type), intent(in) :: pose
-      !> In which direction it goes, and how far in the step [m]
       real(wp), intent(in) :: direction, distance
-      !> The force
       real(wp) :: force
 
       real(wp) :: driving
@@ -318,12 +292,11 @@ contains
       force = driving_part * driving / pose%inverse_mass
    end function max_shift
 
-   !> How long a step may last while thresholds fall, so that contacts let go in time that do so at
-   !> rest; while the slider moves its steps are short enough.
+   !> Maximum duration of a step while thresholds fall [s], so that contacts break in time that do
+   !> so at rest, given the duration of a step by the motion of the slider [s].
    pure function time_to_fall(self, pose, duration) result(time)
       class(population_state_type), intent(in) :: self
       type(pose_type), intent(in) :: pose
-      !> Time in which the slider makes a step [s]
       real(wp), intent(in) :: duration
       real(wp) :: time
 
@@ -337,33 +310,32 @@ contains
       time = max(time, nearest(pose%time, huge(1.0_wp)) - pose%time)
    end function time_to_fall
 
-   !> Find what breaks in a displacement of the slider.
+   !> Find what breaks in a displacement of the slider [m].
    !>
    !> Where many populations start to break together, as they do where the slider turned before, the
-   !> force has a kink: the displacement ends there.
-   subroutine try(self, pose, direction, distance)
+   !> force has a kink: the displacement ends there, which is then the limit of the step [m].
+   subroutine try(self, pose, direction, distance, limit)
       class(population_state_type), intent(inout) :: self
-      !> Pose of the slider
       type(pose_type), intent(in) :: pose
-      !> In which direction it goes
       real(wp), intent(in) :: direction
-      !> Length of the displacement, which may become shorter [m]
-      real(wp), intent(inout) :: distance
+      real(wp), intent(inout) :: distance, limit
 
-      real(wp) :: late, onset, displacement
+      real(wp) :: late, onset, displacement, wanted
 
       call self%pinned%try(pose, pose%displacement + direction * distance, &
          & expected_time(distance), direction, late, onset, self%failure)
       if (late > self%max_late) then
+         wanted = distance
          displacement = onset
          distance = abs(displacement - pose%displacement)
+         if (distance < wanted) limit = distance
          call self%pinned%try(pose, displacement, expected_time(distance), direction, late, &
             & onset, self%failure)
       end if
 
    contains
 
-      !> When the slider will have come so far [s].
+      !> Expected time at which the slider has moved by a distance [s].
       pure function expected_time(distance) result(time)
          real(wp), intent(in) :: distance
          real(wp) :: time

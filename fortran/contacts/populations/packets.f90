@@ -1,8 +1,7 @@
 !> Detached contacts of infinitely many: packets of them, in the order in which they broke.
 !>
-!> A packet is what broke within one step, evenly in time. It attaches as evenly, after the delay.
-!> Where delays are drawn from the exponential law there are no packets: of all that is detached the
-!> same part attaches in a second.
+!> A packet broke within one step, evenly in time, and attaches as evenly, after the delay. With
+!> exponential delays there are no packets: detached contacts attach at a constant rate.
 module mesoslip_contacts_populations_packets
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_numerics_accumulator, only: accumulator_type
@@ -10,34 +9,34 @@ module mesoslip_contacts_populations_packets
    use mesoslip_numerics_errors, only: error_type, raise, status_memory
    use mesoslip_contacts_base, only: contact_parameters_type
    use mesoslip_contacts_mechanics, only: delay_exponential
-   use mesoslip_contacts_populations_motion, only: max_time, patience, position_at
+   use mesoslip_contacts_populations_motion, only: distance_in, max_time, patience, position_at, &
+      & time_after
    use mesoslip_contacts_populations_waiting, only: mean_attached_time, mean_own_time, &
       & attached_part, own_attached_part
    use mesoslip_interface_law, only: pose_type
    implicit none
    private
 
-   public :: detached_packets_type, expected_births_type, new_detached_packets
+   public :: detached_packets_type, expected_births_type, new_detached_packets, shorten_step
 
-   !> Numbers kept for detached contacts: they broke evenly from one time to another [s], so many,
-   !> with such a mass
+   !> Numbers of a packet: start and end of its breaks [s], number of contacts, and their mass
    integer, parameter :: packet_length = 4
    integer, parameter :: row_start = 1, row_end = 2, row_number = 3, row_mass = 4
 
    !> Part of the contacts that is too small for a packet of its own
    real(wp), parameter :: negligible_part = 1.0e-10_wp
-   !> Rate at which contacts break, over that of those before, up to which it is about the same
+   !> Rate of breaks over that of those before, up to which it is about the same
    real(wp), parameter :: max_rate_ratio = 8.0_wp
    !> Packets for which there is room at first
    integer, parameter :: initial_packets = 64
 
    !> Contacts expected to attach in a step.
    type :: expected_births_type
-      !> How many contacts, and their mass
+      !> Number of contacts that are detached before the step, and their mass
       real(wp) :: number = 0.0_wp, mass = 0.0_wp
-      !> How many of those that break in the step itself, and their mass
+      !> Number of contacts that also break in the step, and their mass
       real(wp) :: own = 0.0_wp, own_mass = 0.0_wp
-      !> Until when the step may last for it [s]
+      !> Latest end of the step for them [s]
       real(wp) :: end_time = huge(1.0_wp)
    end type expected_births_type
 
@@ -45,7 +44,7 @@ module mesoslip_contacts_populations_packets
    type :: detached_packets_type
       !> Number and mass of the detached contacts
       type(accumulator_type) :: number, mass
-      !> Part of a step for which nothing may attach in it, between packets
+      !> Part of a step without attachments between packets that does not end it
       real(wp) :: short_gap = 0.0_wp
 
       !> Time between breaking and attaching [s], and whether contacts attach again
@@ -53,39 +52,27 @@ module mesoslip_contacts_populations_packets
       logical, private :: reattach = .true.
       !> Number of contacts that is too small for a packet of its own
       real(wp), private :: negligible = 0.0_wp
-      !> First and last packet
+      !> First and last packet, and attached part of the first
       integer, private :: first = 1, last = 0
-      !> Part of the first one that is attached again
       real(wp), private :: first_part = 0.0_wp
-      !> Contacts that broke and are too few for a packet of their own: they go with the next
+      !> Contacts that are too few for a packet of their own, and join the next
       real(wp), private :: pending(packet_length) = 0.0_wp
-      !> Whether delays are exponential, and then number and mass of what broke in the last step
+      !> Whether delays are exponential, and then number and mass of the breaks in the last step
       logical, private :: is_random = .false.
       real(wp), private :: fresh(2) = 0.0_wp
       !> The packets, shape (packet_length, packets)
       real(wp), allocatable, private :: packet(:, :)
    contains
-      !> Take up contacts that broke
-      procedure, non_overridable :: add
-      !> Whether none waits to attach
-      procedure, non_overridable :: is_empty
-      !> Contacts that will attach in a step, and the part of its breaks that attaches in it
-      procedure, non_overridable :: expect
-      procedure, non_overridable :: own_part
-      !> Take out what is due to attach
-      procedure, non_overridable :: take_due
-      !> Put the state into an archive or take it out
-      procedure, non_overridable :: exchange
-      procedure, non_overridable, private :: due_times, goes_on, make_room, expect_random, &
+      procedure, non_overridable :: add, is_empty, expect, own_part, take_due, exchange
+      procedure, non_overridable, private :: due_times, continues, make_room, expect_random, &
          & take_random
    end type detached_packets_type
 
 contains
 
-   !> Set up packets: none.
+   !> Set up packets without contacts.
    subroutine new_detached_packets(self, parameters)
       type(detached_packets_type), intent(out) :: self
-      !> Parameters of the contacts
       type(contact_parameters_type), intent(in) :: parameters
 
       self%delay = parameters%delay
@@ -95,13 +82,10 @@ contains
       allocate (self%packet(packet_length, initial_packets), source=0.0_wp)
    end subroutine new_detached_packets
 
-   !> Take up contacts that broke evenly from one time to another.
+   !> Add contacts that broke evenly from one time to another [s], and their mass.
    subroutine add(self, start_time, end_time, number, mass, error)
       class(detached_packets_type), intent(inout) :: self
-      !> From when and until when they broke [s]
-      real(wp), intent(in) :: start_time, end_time
-      !> How many they are, and their mass
-      real(wp), intent(in) :: number, mass
+      real(wp), intent(in) :: start_time, end_time, number, mass
       !> Set if there is not enough memory
       type(error_type), allocatable, intent(inout) :: error
 
@@ -112,10 +96,12 @@ contains
          self%fresh = [number, mass]
          return
       end if
-      ! Few that waited are taken to have broken with more that come: a delay is not stretched back.
-      ! Where contacts break all the time, gaps between packets would end steps.
-      if (number >= self%pending(row_number) .and. .not. self%goes_on(start_time, end_time, &
-         & number)) self%pending(row_start) = start_time
+      ! Few pending contacts count as broken together with more that follow: their delay is not
+      ! extended back. Where contacts break all the time, gaps between packets would end steps.
+      if (number >= self%pending(row_number) &
+         & .and. .not. self%continues(start_time, end_time, number)) then
+         self%pending(row_start) = start_time
+      end if
       self%pending(row_end) = end_time
       self%pending(row_number) = self%pending(row_number) + number
       self%pending(row_mass) = self%pending(row_mass) + mass
@@ -127,25 +113,23 @@ contains
       self%pending = 0.0_wp
    end subroutine add
 
-   !> Whether contacts go on to break as those that wait to be enough for a packet, at once and not
-   !> much faster.
-   pure function goes_on(self, start_time, end_time, number)
+   !> Whether breaks continue those of the pending contacts, at once and not much faster.
+   pure function continues(self, start_time, end_time, number)
       class(detached_packets_type), intent(in) :: self
       real(wp), intent(in) :: start_time, end_time, number
-      logical :: goes_on
+      logical :: continues
 
       associate (pending => self%pending)
-         goes_on = self%short_gap > 0.0_wp .and. pending(row_number) > 0.0_wp &
+         continues = self%short_gap > 0.0_wp .and. pending(row_number) > 0.0_wp &
             & .and. pending(row_end) >= start_time &
             & .and. number * (pending(row_end) - pending(row_start)) &
             & <= max_rate_ratio * pending(row_number) * (end_time - start_time)
       end associate
-   end function goes_on
+   end function continues
 
-   !> Whether none waits to attach.
+   !> Whether no contact waits to attach.
    pure function is_empty(self)
       class(detached_packets_type), intent(in) :: self
-      !> Whether that is so
       logical :: is_empty
 
       is_empty = self%first > self%last
@@ -177,7 +161,7 @@ contains
       self%last = waiting
    end subroutine make_room
 
-   !> Times at which a packet attaches, from its first contact that has not yet to its last.
+   !> Times at which the remaining contacts of a packet attach, from the first to the last [s].
    pure subroutine due_times(self, index, early, late)
       class(detached_packets_type), intent(in) :: self
       integer, intent(in) :: index
@@ -191,16 +175,15 @@ contains
    !> Contacts that will attach in a step, and how long it may last for that.
    subroutine expect(self, time, duration, max_births, breaks, births)
       class(detached_packets_type), intent(in) :: self
-      !> When the step starts, and how long it will last if nothing ends it [s]
+      !> Start of the step, and its duration if nothing ends it [s]
       real(wp), intent(in) :: time, duration
-      !> Contacts that may attach in one step at most
+      !> Maximum number of contacts that attach in one step
       real(wp), intent(in) :: max_births
       !> Whether contacts break in the step
       logical, intent(in) :: breaks
-      !> The expectation
       type(expected_births_type), intent(out) :: births
 
-      real(wp) :: early, late, until, left
+      real(wp) :: early, late, until, remaining
       integer :: index
 
       if (self%is_random) then
@@ -216,30 +199,28 @@ contains
             if (births%number > 0.0_wp) births%end_time = until
             return
          end if
-         left = self%packet(row_number, index)
-         if (index == self%first) left = left * (1.0_wp - self%first_part)
-         call add_even(left, self%packet(row_mass, index) / self%packet(row_number, index))
+         remaining = self%packet(row_number, index)
+         if (index == self%first) remaining = remaining * (1.0_wp - self%first_part)
+         call add_even(remaining, self%packet(row_mass, index) / self%packet(row_number, index))
          if (births%end_time < huge(1.0_wp)) return
          if (late >= time + duration) then
-            ! The expectation holds for about the time the slider is expected to take.
-            births%end_time = max(time + patience * duration, nearest(time, 1.0_wp))
+            ! The expectation holds for about the expected duration.
+            births%end_time = time_after(time, patience * duration)
             return
          end if
          until = late
       end do
       if (self%reattach .and. self%delay < duration .and. breaks) then
          ! Contacts that break in this step start to attach in it.
-         births%end_time = min(births%end_time, max(time + patience * duration, &
-            & nearest(time, 1.0_wp)))
+         births%end_time = min(births%end_time, time_after(time, patience * duration))
       else if (births%number > 0.0_wp) then
          births%end_time = until
       end if
 
    contains
 
-      !> Add contacts that attach evenly from early to late.
+      !> Add contacts with a mean mass that attach evenly from early to late.
       subroutine add_even(count, mean_mass)
-         !> How many, and their mean mass
          real(wp), intent(in) :: count, mean_mass
 
          real(wp) :: more, length
@@ -264,10 +245,8 @@ contains
    !> Take out all contacts that are due to attach.
    subroutine take_due(self, before, after, births, moment, when)
       class(detached_packets_type), intent(inout) :: self
-      !> Pose of the slider before the motion, and after it
       type(pose_type), intent(in) :: before, after
-      !> How many they are, and sums over them of the displacement [m] and of the time [s] at which
-      !> they are due
+      !> Their number, and sums over them of displacement [m] and time [s] of attaching
       real(wp), intent(out) :: births, moment, when
 
       real(wp) :: early, late, until, part, part_before, more
@@ -303,12 +282,10 @@ contains
       if (births > 0.0_wp) call self%number%add(-births)
    end subroutine take_due
 
-   !> Part of what breaks evenly in a step that attaches in it.
+   !> Part of the contacts that break evenly in a step of a duration [s] which attaches in it.
    elemental function own_part(self, duration) result(part)
       class(detached_packets_type), intent(in) :: self
-      !> How long the step lasts [s]
       real(wp), intent(in) :: duration
-      !> The part
       real(wp) :: part
 
       part = 0.0_wp
@@ -320,7 +297,7 @@ contains
       end if
    end function own_part
 
-   !> Contacts that will attach in a step where delays are exponential; see expect.
+   !> The same as expect for exponential delays.
    subroutine expect_random(self, time, duration, max_births, breaks, births)
       class(detached_packets_type), intent(in) :: self
       real(wp), intent(in) :: time, duration, max_births
@@ -330,25 +307,26 @@ contains
       real(wp) :: number, part, length
 
       if (self%is_empty()) then
-         if (self%reattach .and. breaks .and. duration < max_time) births%end_time &
-            & = max(time + patience * duration, nearest(time, 1.0_wp))
+         if (self%reattach .and. breaks .and. duration < max_time) then
+            births%end_time = time_after(time, patience * duration)
+         end if
          return
       end if
       number = self%number%total()
-      ! At rest what is detached attaches in a step, but for what is negligible.
+      ! At rest all but a negligible number attaches in a step.
       length = duration
       if (duration >= max_time) length = self%delay * log(number / self%negligible)
       part = attached_part(length / self%delay)
-      births%end_time = max(time + patience * length, nearest(time, 1.0_wp))
+      births%end_time = time_after(time, patience * length)
       if (part * number > max_births) then
          part = max_births / number
-         births%end_time = max(time - self%delay * log(1.0_wp - part), nearest(time, 1.0_wp))
+         births%end_time = time_after(time, -self%delay * log(1.0_wp - part))
       end if
       births%number = part * number
       births%mass = part * self%mass%total()
    end subroutine expect_random
 
-   !> Take out what attaches in a step where delays are exponential; see take_due.
+   !> The same as take_due for exponential delays.
    subroutine take_random(self, before, after, births, moment, when)
       class(detached_packets_type), intent(inout) :: self
       type(pose_type), intent(in) :: before, after
@@ -371,10 +349,22 @@ contains
       self%fresh = 0.0_wp
    end subroutine take_random
 
+   !> Shorten a step of a duration and displacement, and its births, to a time [s].
+   pure subroutine shorten_step(pose, direction, time, span, distance, births)
+      type(pose_type), intent(in) :: pose
+      real(wp), intent(in) :: direction, time
+      real(wp), intent(inout) :: span, distance
+      type(expected_births_type), intent(inout) :: births
+
+      births%number = births%number * time / span
+      births%mass = births%mass * time / span
+      span = time
+      distance = distance_in(pose, direction, span)
+   end subroutine shorten_step
+
    !> Put the state into an archive or take it out.
    subroutine exchange(self, archive)
       class(detached_packets_type), intent(inout) :: self
-      !> The archive
       type(archive_type), intent(inout) :: archive
 
       real(wp), allocatable :: pending(:)

@@ -1,16 +1,16 @@
-!> Pinned contacts of infinitely many: how they are at the start, and how they attach.
+!> Pinned contacts of infinitely many: their initial states, and how they attach.
 module mesoslip_contacts_populations_pinned
    use mesoslip_contacts_ageing_law, only: ageing_law_type
    use mesoslip_contacts_base, only: contact_parameters_type
    use mesoslip_contacts_mechanics, only: breaking_distance, broken_threshold, coupling_scaled, &
       & coupling_table, initial_steady, initial_uniform
    use mesoslip_contacts_partial_moments, only: new_partial_moments
-   use mesoslip_contacts_populations_thermal, only: thermal_populations_type, joining_part
    use mesoslip_contacts_populations_activation, only: new_activation
    use mesoslip_contacts_populations_breaking, only: unresolved_part
    use mesoslip_contacts_populations_rows, only: column_weight, compliant, moments_length, &
       & new_population_rows, number, stiff
    use mesoslip_contacts_populations_table_lives, only: new_table_lives, newborn_law
+   use mesoslip_contacts_populations_thermal, only: thermal_populations_type, joining_part
    use mesoslip_numerics_errors, only: error_type
    use mesoslip_numerics_kinds, only: wp
    implicit none
@@ -18,13 +18,13 @@ module mesoslip_contacts_populations_pinned
 
    public :: pinned_populations_type, new_pinned_populations
 
-   !> Relative width of the law of thresholds beyond which populations are not farther apart.
+   !> Relative width of the law of thresholds beyond which the length of steps does not grow
    real(wp), parameter :: max_spread = 0.35_wp
    !> Length of a step over the resolution times the spread of the breaking stretches
    real(wp), parameter :: step_part = 0.6_wp
    !> Stretch beyond which the cells of the initial states of wide laws grow with it
    real(wp), parameter :: min_even = 0.02_wp
-   !> Forces at attaching if they have a width, evenly spaced, and how far they reach in standard
+   !> Number of forces at attaching if they have a width, evenly spaced, and their range in standard
    !> deviations
    integer, parameter :: max_classes = 25
    real(wp), parameter :: reach = 6.0_wp
@@ -35,33 +35,25 @@ module mesoslip_contacts_populations_pinned
       real(wp) :: newborn_stiffness = 0.0_wp, newborn_energy = 0.0_wp
       !> Mean relative force of a contact that attaches
       real(wp) :: newborn_force = 0.0_wp
-      !> Forces with which contacts attach: how many there are, the relative forces, thresholds at
-      !> or below which a contact could not attach with each, the shares of contacts before those
-      !> thresholds are rejected, and those of contacts that attach
+      !> Number of forces at attaching; for each the relative force, the threshold up to which no
+      !> contact can attach with it, and the shares of contacts before and after the rejection of
+      !> these
       integer, private :: classes = 1
       real(wp), private :: class_force(max_classes) = 0.0_wp, class_broken(max_classes) = 0.0_wp, &
          & share(max_classes) = 1.0_wp, newborn_share(max_classes) = 1.0_wp
    contains
-      !> Let thresholds change with age
-      procedure, non_overridable :: set_ageing
-      !> Let contacts break by thermal activation
-      procedure, non_overridable :: activate
-      !> Prepare the populations for the start of a run
-      procedure, non_overridable :: initialize
-      !> Attach contacts as a population, or as one for each force
-      procedure, non_overridable :: attach
+      procedure, non_overridable :: set_ageing, activate, initialize, attach
       procedure, non_overridable, private :: tabulate_moments, place_classes, sum_newborns, &
          & law_of, may_join_last, add_sliding
    end type pinned_populations_type
 
 contains
 
-   !> Set up populations: none.
+   !> Set up populations without contacts, with the length of a step over the spread of the breaking
+   !> stretches.
    subroutine new_pinned_populations(self, parameters, resolution)
       type(pinned_populations_type), intent(out) :: self
-      !> Parameters of the contacts
       type(contact_parameters_type), intent(in) :: parameters
-      !> Length of a step over the spread of the breaking stretches, positive
       real(wp), intent(in) :: resolution
 
       call new_population_rows(self, parameters)
@@ -98,21 +90,19 @@ contains
       self%first_broken = self%parameters%law%quantile(1.0_wp - unresolved_part)
    end subroutine tabulate_moments
 
-   !> Maximum displacement in which one population attaches, of equal contacts.
+   !> Maximum displacement in which one population of equal contacts attaches [m], given the spread
+   !> of the breaking stretches and f_s/k [m].
    pure function step_length(spread, resolution, stretch) result(length)
-      !> Spread of the breaking stretches, length of a step over it, and f_s/k [m]
       real(wp), intent(in) :: spread, resolution, stretch
-      !> Length [m]
       real(wp) :: length
 
       length = step_part * resolution * min(spread, max_spread) * stretch
    end function step_length
 
-   !> Let contacts break by thermal activation, which spreads their breaking stretches too. If their
-   !> thresholds change with age, that has been set before.
+   !> Let contacts break by thermal activation at a rate [1/s] with the width f_T/f_s, which spreads
+   !> their breaking stretches too. Ageing is set before.
    subroutine activate(self, rate, width, resolution)
       class(pinned_populations_type), intent(inout) :: self
-      !> Rate of breaking at the threshold [1/s], f_T/f_s, and length of a step over the spread
       real(wp), intent(in) :: rate, width, resolution
 
       call self%set_activation(new_activation(rate, width, self%stretch), resolution)
@@ -128,19 +118,19 @@ contains
 
       self%classes = max_classes
       do class = 1, max_classes
-         ! Evenly spaced points are exact for a normal law, but for what its tails lack.
+         ! Evenly spaced points are exact for a normal law without tails.
          deviate = reach * (2.0_wp * (class - 1) / (max_classes - 1) - 1.0_wp)
          self%class_force(class) = self%parameters%back_force_ratio &
             & + self%parameters%newborn_width * deviate
          self%share(class) = exp(-0.5_wp * deviate**2)
-         ! The law of a table with stiffnesses has the contacts of each force.
+         ! The law of a table with stiffnesses depends on the force.
          if (self%parameters%coupling /= coupling_table) then
             self%class_broken(class) = abs(self%class_force(class))
          end if
       end do
    end subroutine place_classes
 
-   !> Sum up what attaches: the law of forces is cut off at the thresholds.
+   !> Sum up the contacts that attach: the law of forces is cut off at the thresholds.
    subroutine sum_newborns(self)
       class(pinned_populations_type), intent(inout) :: self
 
@@ -170,7 +160,6 @@ contains
    !> Let thresholds change with age.
    subroutine set_ageing(self, ageing)
       class(pinned_populations_type), intent(inout) :: self
-      !> How they change
       type(ageing_law_type), intent(in) :: ageing
 
       self%ages = .true.
@@ -182,7 +171,6 @@ contains
    !> Prepare the populations for the start of a run.
    subroutine initialize(self, state, error)
       class(pinned_populations_type), intent(inout) :: self
-      !> One of the initial_ codes
       integer, intent(in) :: state
       !> Set if there is not enough memory
       type(error_type), allocatable, intent(inout) :: error
@@ -214,19 +202,19 @@ contains
       call self%sum_forces()
    end subroutine initialize
 
-   !> Add contacts that attached with one force, as many in each displacement.
+   !> Add contacts that attached with one force, evenly in displacement.
    subroutine add_sliding(self, force, share, moments, broken, error)
       class(pinned_populations_type), intent(inout) :: self
       !> Relative force at attaching, and relative number of contacts
       real(wp), intent(in) :: force, share
-      !> Which moments are theirs
+      !> Index of their moments
       integer, intent(in) :: moments
-      !> Relative threshold at or below which none attached
+      !> Relative threshold up to which no contact attached
       real(wp), intent(in) :: broken
       !> Set if there is not enough memory
       type(error_type), allocatable, intent(inout) :: error
 
-      real(wp) :: max_distance, cell, middle, edge, even, least
+      real(wp) :: max_distance, cell, middle, edge, even, reached
 
       associate (coupling => self%parameters%coupling)
          if (self%has_table) then
@@ -243,24 +231,25 @@ contains
             cell = min(self%step / self%stretch * max(even, edge), max_distance - edge)
             middle = edge + 0.5_wp * cell
             edge = edge + cell
-            least = middle
-            if (.not. self%has_table) least = max(broken, broken_threshold(coupling, force, middle))
-            call self%add(-middle * self%stretch, force, share * cell, moments, least, 0.0_wp, &
+            reached = middle
+            if (.not. self%has_table) then
+               reached = max(broken, broken_threshold(coupling, force, middle))
+            end if
+            call self%add(-middle * self%stretch, force, share * cell, moments, reached, 0.0_wp, &
                & -self%ageing%initial_age, 0.0_wp, error)
          end do
       end associate
    end subroutine add_sliding
 
-   !> Attach contacts as one population for each force, where they do on average.
+   !> Attach contacts as one population for each force, at their mean displacement.
    subroutine attach(self, births, moment, direction, displacement, birth, time, lost, error)
       class(pinned_populations_type), intent(inout) :: self
-      !> How many they are, the sum of their displacements [m], and the direction of their forces
+      !> Number of contacts, sum of their displacements [m], and direction of their forces
       real(wp), intent(in) :: births, moment, direction
-      !> Displacement [m], mean time at which the contacts attached, and time [s]
+      !> Displacement of the slider [m], mean time of attaching, and time [s]
       real(wp), intent(in) :: displacement, birth, time
       !> Elastic energy that is lost as contacts join others [J]
       real(wp), intent(out) :: lost
-      !> Set if there is not enough memory
       type(error_type), allocatable, intent(inout) :: error
 
       real(wp) :: origin, force, mean_force
@@ -295,10 +284,9 @@ contains
       self%open_direction = direction
    end subroutine attach
 
-   !> Law of the contacts that attach with one of the forces.
+   !> Law of the contacts that attach with one of the forces in a direction of motion.
    pure function law_of(self, class, direction) result(law)
       class(pinned_populations_type), intent(in) :: self
-      !> Which force, and the direction of motion
       integer, intent(in) :: class
       real(wp), intent(in) :: direction
       integer :: law
@@ -307,10 +295,9 @@ contains
       if (self%has_table) law = newborn_law(class, direction)
    end function law_of
 
-   !> Whether contacts that attach may join the last populations.
+   !> Whether contacts that attach at an origin [m] and a time [s] may join the last populations.
    pure function may_join_last(self, origin, birth, direction) result(joins)
       class(pinned_populations_type), intent(in) :: self
-      !> Where and when they attach [m] and [s], and the direction of their forces
       real(wp), intent(in) :: origin, birth, direction
       logical :: joins
 

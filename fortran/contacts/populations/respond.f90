@@ -9,10 +9,10 @@ module mesoslip_contacts_populations_respond
 
    public :: respond_to_motion
 
-   !> Populations whose work is that of one contact that breaks
+   !> Populations that cost as much as one contact that breaks
    real(wp), parameter :: populations_per_cost = 16.0_wp
-   !> Duration of a step over the time in which the slider oscillates, per radian, beyond which its
-   !> motion is taken as even
+   !> Duration of a step over the time in which the slider oscillates by a radian, beyond which its
+   !> motion counts as uniform
    real(wp), parameter :: even_time = 1.5_wp
 
 contains
@@ -20,7 +20,6 @@ contains
    !> Break and attach contacts after a motion of the slider.
    subroutine respond_to_motion(self, before, after)
       class(population_state_type), intent(inout) :: self
-      !> Pose of the slider before the motion, and after it
       type(pose_type), intent(in) :: before, after
 
       type(pose_type) :: start, end
@@ -43,11 +42,11 @@ contains
       end if
       self%detached_count = self%detached%number%total()
       self%cost = 1.0_wp + self%pinned%count / populations_per_cost
-      if (self%pinned%is_thermal) call note_step(self, before, after)
+      if (self%pinned%is_thermal) call record_step(self, before, after)
       self%offers = .false.
    end subroutine respond_to_motion
 
-   !> Detach what was found to break.
+   !> Detach the contacts that break in the trial.
    subroutine detach_tried(self, before, after)
       class(population_state_type), intent(inout) :: self
       type(pose_type), intent(in) :: before, after
@@ -60,8 +59,7 @@ contains
       end associate
    end subroutine detach_tried
 
-   !> Break contacts whose thresholds fell to forces against the direction of motion, which the
-   !> motion does not increase.
+   !> Break contacts whose thresholds fell to forces against the direction of motion.
    subroutine break_fallen(self, before, after)
       class(population_state_type), intent(inout) :: self
       type(pose_type), intent(in) :: before, after
@@ -72,11 +70,7 @@ contains
       if (abs(after%displacement - before%displacement) > 0.0_wp) then
          direction = sign(1.0_wp, before%displacement - after%displacement)
       end if
-      if (direction > 0.0_wp) then
-         if (after%displacement < self%pinned%ahead) return
-      else
-         if (after%displacement > self%pinned%behind) return
-      end if
+      if (self%pinned%gap_ahead(after%displacement, direction) > 0.0_wp) return
       call self%pinned%try(before, after%displacement, after%time, direction, late, onset, &
          & self%failure)
       call detach_tried(self, before, after)
@@ -93,19 +87,11 @@ contains
 
       distance = after%displacement - before%displacement
       direction = sign(1.0_wp, distance)
-      if (direction > 0.0_wp) then
-         has_broken = after%displacement > self%pinned%ahead
-      else
-         has_broken = after%displacement < self%pinned%behind
-      end if
+      has_broken = self%pinned%gap_ahead(after%displacement, direction) < 0.0_wp
       if (self%pinned%some_fall .and. .not. has_broken) then
          ! Where thresholds fall contacts may break at rest.
          if (.not. abs(distance) > 0.0_wp) direction = after%direction
-         if (direction > 0.0_wp) then
-            has_broken = after%displacement >= self%pinned%ahead
-         else
-            has_broken = after%displacement <= self%pinned%behind
-         end if
+         has_broken = self%pinned%gap_ahead(after%displacement, direction) <= 0.0_wp
       end if
       if (.not. has_broken) return
       if (.not. self%pinned%has_tried(after%displacement, after%time)) then
@@ -129,7 +115,7 @@ contains
          & self%failure)
    end subroutine try_thermal
 
-   !> Take a motion as even in which the slider may have oscillated many times, by next to nothing.
+   !> Make a motion uniform in which the slider may have oscillated many times, hardly visibly.
    pure subroutine straighten(self, before, after)
       class(population_state_type), intent(in) :: self
       type(pose_type), intent(inout) :: before, after
@@ -144,8 +130,8 @@ contains
       after%acceleration = 0.0_wp
    end subroutine straighten
 
-   !> Note what the next step is based on.
-   subroutine note_step(self, before, after)
+   !> Record what the next step is based on.
+   subroutine record_step(self, before, after)
       class(population_state_type), intent(inout) :: self
       type(pose_type), intent(in) :: before, after
 
@@ -162,9 +148,9 @@ contains
       self%excess = (self%offered%stiffness - law%stiffness) * after%displacement &
          & - (self%offered%offset - law%offset) + (self%offered%drag - law%drag) * after%velocity &
          & + self%offered%rate * duration
-   end subroutine note_step
+   end subroutine record_step
 
-   !> Add the work by which the offered force differs from that of the contacts as they were.
+   !> Add the work of the offered force minus that of the contacts before the motion.
    subroutine add_step_work(self, before, after)
       class(population_state_type), intent(inout) :: self
       type(pose_type), intent(in) :: before, after
@@ -181,7 +167,7 @@ contains
          & * (0.5_wp * distance - excess_of_mean(before, after)))
    end subroutine add_step_work
 
-   !> Attach all contacts that are due, as one population where they do on average.
+   !> Attach all contacts that are due, as one population at their mean displacement.
    subroutine attach_due(self, before, after)
       class(population_state_type), intent(inout) :: self
       type(pose_type), intent(in) :: before, after

@@ -1,12 +1,12 @@
-!> Rows of numbers about pinned contacts of infinitely many, each about a population.
+!> Numbers of pinned contacts of infinitely many, a row for each population.
 !>
-!> A population is what attached within one step. It is labelled by its origin, so that nothing is
-!> advected, and remembers below which threshold its contacts have broken: the maximum of the force
-!> on it, in either direction.
+!> A population attached within one step. It is labelled by its origin, so that nothing is advected,
+!> and keeps the threshold below which its contacts have broken: the maximum of the force on it, in
+!> either direction.
 !>
-!> Thresholds may change with the age of a population. What has broken of it is then given by the
-!> configured threshold of the last contact that did, as contacts of one age and force break in its
-!> order. It is found again at the end of each step, from the force and the age.
+!> Where thresholds change with age, that is the configured threshold of the last contact that
+!> broke, as contacts of one age and force break in its order. It is solved again at the end of each
+!> step, from the force and the age.
 !>
 !> With the stiffnesses of a table, the threshold alone does not determine which contacts have
 !> broken: a population keeps how far the slider was ahead of its origin and behind it, where it
@@ -32,29 +32,29 @@ module mesoslip_contacts_populations_rows
    public :: column_origin, column_force, column_weight, column_broken, column_law, column_ahead, &
       & column_behind, column_birth, column_level
 
-   !> Moments of the thresholds of a population's pinned contacts: their number, stiffness, one over
-   !> it, twice the energy that they lose in breaking, and mass.
+   !> Moments of the thresholds of a population's pinned contacts: number, stiffness, one over it,
+   !> twice the energy that they lose in breaking, and mass
    integer, parameter :: moments_length = 5
    integer, parameter :: number = 1, stiff = 2, compliant = 3, lost = 4, massive = 5
 
-   !> Numbers kept for a population, besides its moments
+   !> Numbers of a population, besides its moments
    integer, parameter :: population_length = 9
-   !> Displacement at which stretches are zero but for the force at attaching [m]
+   !> Displacement at which stretches are zero except for the force at attaching [m]
    integer, parameter :: column_origin = 1
    !> Force at attaching, signed
    integer, parameter :: column_force = 2
-   !> Contacts that attached, broken or not
+   !> Number of contacts that attached, broken or not
    integer, parameter :: column_weight = 3
    !> Threshold below which they have broken
    integer, parameter :: column_broken = 4
    !> 1 for the law of thresholds, 2 for that weighted by one over the breaking stretch; see
    !> mesoslip_contacts_populations_table_lives for those of a table with stiffnesses
    integer, parameter :: column_law = 5
-   !> Displacements at which contacts break, forward and backward [m]
+   !> Displacements at which contacts break next, forward and backward [m]
    integer, parameter :: column_ahead = 6, column_behind = 7
-   !> When it attached [s]
+   !> Time of attaching [s]
    integer, parameter :: column_birth = 8
-   !> Level of its hazard, if its contacts break by thermal activation
+   !> Level of the hazard of thermal activation
    integer, parameter :: column_level = 9
 
    !> Populations for which there is room at first
@@ -66,66 +66,49 @@ module mesoslip_contacts_populations_rows
       integer :: count = 0
       !> Bounds on the displacements at which contacts break next, forward and backward [m]
       real(wp) :: ahead = huge(1.0_wp), behind = -huge(1.0_wp)
-      !> Total stiffness [N/m] and stiffness times origin less force at attaching [N]
+      !> Total stiffness [N/m], and total of stiffness times origin minus force at attaching [N]
       type(accumulator_type) :: stiffness, offset
 
       !> Whether thresholds change with age, how, and whether some fall
       logical :: ages = .false.
       type(ageing_law_type) :: ageing
       logical :: some_fall = .false.
-      !> Since when all contacts age that are attached [s]
+      !> Time since which all attached contacts age [s]
       real(wp) :: last_birth = 0.0_wp
 
-      !> Parameters of the contacts
       type(contact_parameters_type) :: parameters
-      !> Distance of a mean threshold f_s/k [m]
+      !> Stretch of a mean contact at its threshold, f_s/k [m]
       real(wp) :: stretch = 1.0_wp
       !> Threshold at which the first contacts of a population break
       real(wp) :: first_broken = 0.0_wp
       !> Moments of the law of thresholds, and of that weighted by one over the breaking stretch
       type(partial_moments_type) :: moments(2)
-      !> Whether contacts have the stiffnesses of a table, and what is left of them
+      !> Whether contacts have the stiffnesses of a table, and their survival
       logical :: has_table = .false.
       type(table_lives_type) :: table_lives
-      !> Whether populations keep their order, that in which they attached; the number of those at
-      !> the end that contacts may still join, where the first of them attached [m], and in which
-      !> direction their forces are
+      !> Whether populations keep the order in which they attached; the number of those at the end
+      !> that contacts may still join, the first origin of these [m], and the sign of their forces
       logical :: keeps_order = .false.
       integer :: open_count = 0
       real(wp) :: open_origin = 0.0_wp, open_direction = 1.0_wp
-      !> Populations, shape (rows, population_length), as many are in use as there are
+      !> Numbers of the populations, shape (count or more, population_length)
       real(wp), allocatable :: population(:, :)
-      !> Moments of their contacts that are left, shape (moments_length, rows)
+      !> Moments of the pinned contacts, shape (moments_length, count or more)
       real(wp), allocatable :: left(:, :)
-      !> Part of them that thermal activation leaves at nodes over the thresholds, if they age too,
-      !> shape (nodes, rows)
+      !> With ageing and thermal activation, surviving part at nodes over the thresholds, shape
+      !> (nodes, count or more)
       real(wp), allocatable :: kept(:, :)
    contains
-      !> Add a population
-      procedure, non_overridable :: add
-      !> Displacement at which contacts of a population break next in a direction
-      procedure, non_overridable :: next_break
-      !> Find again where populations break next, as their thresholds have changed
-      procedure, non_overridable :: update_thresholds
-      !> Recompute stiffness and offset, and find what breaks next
-      procedure, non_overridable :: sum_forces
-      !> Move the origin of displacements
-      procedure, non_overridable :: shift_origin
-      !> Number of contacts
-      procedure, non_overridable :: number_of_contacts
-      !> Elastic energy of the contacts
-      procedure, non_overridable :: elastic_energy
-      !> Put the state into an archive or take it out
-      procedure, non_overridable :: exchange
+      procedure, non_overridable :: add, next_break, update_thresholds, sum_forces, shift_origin, &
+         & number_of_contacts, elastic_energy, exchange
       procedure, non_overridable, private :: make_room, next_break_of_table
    end type population_rows_type
 
 contains
 
-   !> Set up rows: none.
+   !> Set up rows without contacts.
    subroutine new_population_rows(self, parameters)
       class(population_rows_type), intent(inout) :: self
-      !> Parameters of the contacts
       type(contact_parameters_type), intent(in) :: parameters
 
       self%parameters = parameters
@@ -137,14 +120,14 @@ contains
    !> Add a population.
    subroutine add(self, origin, force, weight, law, broken, displacement, birth, time, error)
       class(population_rows_type), intent(inout) :: self
-      !> Where it attached [m], with what force, how many contacts, with which law
+      !> Origin [m], force and law at attaching, and number of contacts
       real(wp), intent(in) :: origin, force, weight
       integer, intent(in) :: law
-      !> Threshold below which they have broken before; distance up to which they have of a table
+      !> Threshold below which contacts have broken before, or distance for those of a table
       real(wp), intent(in) :: broken
-      !> Displacement of the slider [m]: contacts due to break there do so when it moves on
+      !> Displacement of the slider [m]: contacts that are due there break in its next motion
       real(wp), intent(in) :: displacement
-      !> When it attached, and when that is [s]
+      !> Time of attaching, and present time [s]
       real(wp), intent(in) :: birth, time
       !> Set if there is not enough memory
       type(error_type), allocatable, intent(inout) :: error
@@ -209,11 +192,10 @@ contains
       call move_alloc(kept, self%kept)
    end subroutine make_room
 
-   !> Displacement at which contacts of a population break next in a direction.
+   !> Displacement at which contacts of a population break next in a direction, at a time [s].
    pure function next_break(self, row, direction, time) result(displacement)
       class(population_rows_type), intent(in) :: self
       integer, intent(in) :: row
-      !> The direction, and when that is [s]
       real(wp), intent(in) :: direction, time
       real(wp) :: displacement
 
@@ -231,8 +213,8 @@ contains
          & direction * self%population(row, column_force), threshold)
    end function next_break
 
-   !> The same of contacts with the stiffnesses of a table: none in one direction while those break
-   !> in the other that would have been the first.
+   !> The same for contacts with the stiffnesses of a table: breaks in one direction may have
+   !> removed the first contacts in the other.
    pure function next_break_of_table(self, row, direction) result(displacement)
       class(population_rows_type), intent(in) :: self
       integer, intent(in) :: row
@@ -251,10 +233,9 @@ contains
       end associate
    end function next_break_of_table
 
-   !> Find again where populations break next, as their thresholds have changed.
+   !> Update where populations break next, with the slider at a displacement [m] and a time [s].
    subroutine update_thresholds(self, displacement, time)
       class(population_rows_type), intent(inout) :: self
-      !> Displacement of the slider [m], and time [s]
       real(wp), intent(in) :: displacement, time
 
       real(wp) :: threshold, rate
@@ -276,7 +257,7 @@ contains
       self%behind = maxval(self%population(:self%count, column_behind))
    end subroutine update_thresholds
 
-   !> Recompute stiffness and offset, and find what breaks next.
+   !> Recompute stiffness and offset, and the bounds on the next breaks.
    subroutine sum_forces(self)
       class(population_rows_type), intent(inout) :: self
 
@@ -295,10 +276,9 @@ contains
       self%behind = maxval(self%population(:self%count, column_behind))
    end subroutine sum_forces
 
-   !> Move the origin of displacements.
+   !> Shift the origin of displacements [m].
    subroutine shift_origin(self, shift)
       class(population_rows_type), intent(inout) :: self
-      !> Displacement of the new origin [m]
       real(wp), intent(in) :: shift
 
       associate (all => self%population(:self%count, :))
@@ -313,18 +293,15 @@ contains
    !> Number of contacts.
    pure function number_of_contacts(self) result(total)
       class(population_rows_type), intent(in) :: self
-      !> Their number, in the mean of what it may be
       real(wp) :: total
 
       total = sum(self%left(number, :self%count))
    end function number_of_contacts
 
-   !> Elastic energy of the contacts.
+   !> Elastic energy of the contacts with the slider at a displacement [m], in joules.
    pure function elastic_energy(self, displacement) result(energy)
       class(population_rows_type), intent(in) :: self
-      !> Displacement of the slider [m]
       real(wp), intent(in) :: displacement
-      !> Energy [J]
       real(wp) :: energy
 
       type(accumulator_type) :: total
@@ -345,7 +322,6 @@ contains
    !> Put the state into an archive or take it out.
    subroutine exchange(self, archive)
       class(population_rows_type), intent(inout) :: self
-      !> The archive
       type(archive_type), intent(inout) :: archive
 
       call archive%section("pinned populations")

@@ -1,4 +1,4 @@
-!> State of populations of contacts while a slider moves: pinned ones, detached ones, and the
+!> State of populations of contacts while a slider moves: pinned and detached contacts, and the
 !> force that the slider was offered.
 module mesoslip_contacts_populations_state
    use mesoslip_contacts_base, only: contacts_type
@@ -16,19 +16,20 @@ module mesoslip_contacts_populations_state
       type(pinned_populations_type) :: pinned
       type(detached_packets_type) :: detached
 
-      !> The law that was offered for the step, if one was
+      !> Law that was offered for the step, and whether one was
       type(interface_law_type) :: offered
       logical :: offers = .false.
 
-      !> Contacts that attach in one step at most, when the slider moves and when it rests
+      !> Maximum numbers of contacts that attach in one step, when the slider moves and when it
+      !> rests
       real(wp) :: max_attached = 0.0_wp, max_attached_at_rest = 0.0_wp
-      !> Breaks in one step of populations that start to break in it, at most
+      !> Maximum number of breaks in one step of populations that start to break in it
       real(wp) :: max_late = 0.0_wp
-      !> Part of the time of ageing that a step may last while thresholds fall, and how long this
-      !> step may last for that [s]
+      !> Maximum duration of a step while thresholds fall, over the time of ageing, and for this
+      !> step [s]
       real(wp) :: resolution = 1.0_wp, max_fall_time = huge(1.0_wp)
-      !> Where contacts break by thermal activation: duration of the last step [s], mean velocity in
-      !> it [m/s], and what the offered force had beyond the contact force at its end [N]
+      !> With thermal activation: duration of the last step [s], mean velocity in it [m/s], and
+      !> offered force minus contact force at its end [N]
       real(wp) :: last_duration = huge(1.0_wp), last_velocity = 0.0_wp, excess = 0.0_wp
    contains
       procedure :: law
@@ -46,12 +47,11 @@ contains
       law%drag = self%parameters%drag * self%detached%mass%total()
    end function law
 
-   !> Rate at which the slider oscillates or is damped on the contacts [1/s].
+   !> Rate at which the slider oscillates or is damped on the contacts [1/s]; 0 for a slider with
+   !> prescribed motion.
    pure function oscillation_rate(self, pose) result(rate)
       class(population_state_type), intent(in) :: self
-      !> Pose of the slider
       type(pose_type), intent(in) :: pose
-      !> The rate, 0 for a slider of which the motion is prescribed
       real(wp) :: rate
 
       rate = sqrt(pose%own_rate**2 + max(0.0_wp, self%pinned%stiffness%total()) &

@@ -1,16 +1,16 @@
-!> Survival of contacts of all thresholds under thermal activation, for one history.
+!> Survival of contacts of all thresholds under thermal activation.
 !>
 !> A contact of the relative threshold u has the integrated hazard exp((e - u)/theta), where theta
 !> is f_T/f_s and the level e is the same for all contacts of a population. It has broken at once
-!> if u is not above the maximum b of the force on it. So the number of those that are left is
+!> if u is not above the maximum b of the force on it. So the number of surviving contacts is
 !>
 !>     M(b, e) = integral of p(u) exp(-exp((e - u)/theta)) over u > b.
 !>
 !> With s = (b - e)/theta it depends on s over a distance of about 1, and on b as smoothly as the
-!> law. The table is of ln(-ln(M/S)), S(b) being what is left without activation: that is nearly
-!> linear in s. Contacts of which nearly all below e have broken do not depend on b. They have a
-!> table of one variable, with as many knots as it needs. Laws whose density is constant in cells
-!> have sums of a function of one variable in place of tables.
+!> law. The table is of ln(-ln(M/S)), which is nearly linear in s; S(b) is the number without
+!> activation. Where nearly all contacts below e have broken, M does not depend on b: then there is
+!> a table of one variable, with as many knots as it needs. Laws whose density is constant in cells
+!> have sums of a function of one variable instead of tables.
 module mesoslip_contacts_populations_survivors
    use mesoslip_contacts_partial_moments, only: partial_moments_type
    use mesoslip_contacts_threshold_coordinate, only: threshold_coordinate_type
@@ -22,7 +22,7 @@ module mesoslip_contacts_populations_survivors
 
    public :: survivors_type, new_survivors, no_level
 
-   !> Level of contacts that have no hazard yet
+   !> Level of contacts without a hazard yet
    real(wp), parameter :: no_level = -huge(1.0_wp)
 
    !> Range of s in the table, knots, and knots of b
@@ -34,12 +34,13 @@ module mesoslip_contacts_populations_survivors
    !> where the hazard varies, and maximum number of nodes
    integer, parameter :: points = 8, law_panels = 24, max_nodes = 4096
    real(wp), parameter :: panel = 2.0_wp
-   !> Distances over theta, below and above e, beyond which all have broken and none has
+   !> Distances over theta below and above e beyond which all contacts and no contacts have broken
    real(wp), parameter :: below = 4.0_wp, above = 34.0_wp
-   !> Levels of the table of one variable: distances below the lowest threshold and above the
-   !> highest over theta
+   !> Range of levels in the table of one variable: distances over theta below the lowest threshold
+   !> and above the highest
    real(wp), parameter :: early = 12.0_wp, late = 3.5_wp
-   !> Error of its interpolation, and cells at first; halvings of one of them at most
+   !> Error of its interpolation, initial number of cells, maximum halvings of one of them, and
+   !> maximum number of knots
    real(wp), parameter :: tolerance = 1.0e-9_wp
    integer, parameter :: first_cells = 48, max_halvings = 30, max_knots = 20000
    !> Knots of the loss by cells, and its range
@@ -47,7 +48,7 @@ module mesoslip_contacts_populations_survivors
    real(wp), parameter :: loss_first = -4.0_wp, loss_step = 0.02_wp
    real(wp), parameter :: euler = 0.57721566490153286061_wp
 
-   !> Points of a quadrature over thresholds, and what is above the last of them.
+   !> Points of a quadrature over thresholds, and the number of contacts above the last of them.
    type :: nodes_type
       integer :: count = 0
       real(wp) :: threshold(max_nodes) = 0.0_wp, share(max_nodes) = 0.0_wp, rest = 0.0_wp
@@ -65,7 +66,7 @@ module mesoslip_contacts_populations_survivors
       !> First knot of b and their distance, in the coordinate of the law
       real(wp), private :: first_b = 0.0_wp, step_b = 1.0_wp
       real(wp), private :: point(points) = 0.0_wp, weight(points) = 0.0_wp
-      !> Values, slopes in s and b and mixed ones at the knots, over their distances, shape (4,
+      !> Values and, over the distances of knots, slopes in s and b and mixed ones, shape (4,
       !> knots_s, knots_b)
       real(wp), allocatable, private :: table(:, :, :)
       !> Levels, values and slopes of the table of one variable, shape (3, knots)
@@ -73,7 +74,6 @@ module mesoslip_contacts_populations_survivors
       !> Of a law with a constant density in cells: edges, densities, and the loss above each knot
       real(wp), allocatable, private :: edge(:), density(:), loss(:)
    contains
-      !> How many contacts are left
       procedure, non_overridable :: left
       procedure, non_overridable, private :: tabulate, tabulate_free, tabulate_loss
       procedure, non_overridable, private :: place_nodes, free_at, free_share, table_share, &
@@ -82,15 +82,12 @@ module mesoslip_contacts_populations_survivors
 
 contains
 
-   !> Tabulate what activation leaves of contacts of a law.
-   subroutine new_survivors(self, law, moments, order, width)
+   !> Tabulate the survivors of a law, of which the first partial moment is the number of contacts,
+   !> for the width f_T/f_s.
+   subroutine new_survivors(self, law, moments, width)
       type(survivors_type), intent(out) :: self
-      !> The law
       class(threshold_law_type), intent(in) :: law
-      !> Its partial moments, and which of them is the number of contacts
       type(partial_moments_type), intent(in) :: moments
-      integer, intent(in) :: order
-      !> f_T/f_s
       real(wp), intent(in) :: width
 
       self%width = width
@@ -107,29 +104,26 @@ contains
       self%first_b = self%coordinate%at(self%lowest)
       self%law_panel = (self%coordinate%at(moments%max_threshold) - self%first_b) / law_panels
       self%step_b = (self%coordinate%at(self%highest) - self%first_b) / (knots_b - 1)
-      call self%tabulate(law, moments, order)
-      call self%tabulate_free(law, moments, order)
+      call self%tabulate(law, moments)
+      call self%tabulate_free(law, moments)
    end subroutine new_survivors
 
    !> Number of contacts above a threshold without activation.
-   pure function number_above(moments, order, threshold) result(number)
+   pure function number_above(moments, threshold) result(number)
       type(partial_moments_type), intent(in) :: moments
-      integer, intent(in) :: order
       real(wp), intent(in) :: threshold
       real(wp) :: number
 
       associate (all => moments%above(threshold))
-         number = all(order)
+         number = all(1)
       end associate
    end function number_above
 
-   !> Points over the thresholds from one to another, dense where the hazard varies.
-   subroutine place_nodes(self, law, moments, order, first, last, level, nodes)
+   !> Points over a range of thresholds, dense where the hazard varies: around a level and above.
+   subroutine place_nodes(self, law, moments, first, last, level, nodes)
       class(survivors_type), intent(in) :: self
       class(threshold_law_type), intent(in) :: law
       type(partial_moments_type), intent(in) :: moments
-      integer, intent(in) :: order
-      !> Range of thresholds, and a level: around it and above the hazard varies
       real(wp), intent(in) :: first, last, level
       type(nodes_type), intent(inout) :: nodes
 
@@ -147,7 +141,7 @@ contains
          end if
          do node = 1, points
             nodes%count = nodes%count + 1
-            ! In the coordinate of the law, in which it is smooth.
+            ! In the coordinate of the law, in which its density is smooth.
             place = self%coordinate%at(start) &
                & + self%point(node) * (self%coordinate%at(end) - self%coordinate%at(start))
             nodes%threshold(nodes%count) = self%coordinate%threshold(place)
@@ -160,17 +154,16 @@ contains
          start = end
          if (start > level + above * self%width) exit
       end do
-      nodes%rest = number_above(moments, order, start)
+      nodes%rest = number_above(moments, start)
    end subroutine place_nodes
 
-   !> Tabulate what is left over s and b.
-   subroutine tabulate(self, law, moments, order)
+   !> Tabulate the survivors over s and b.
+   subroutine tabulate(self, law, moments)
       class(survivors_type), intent(inout) :: self
       class(threshold_law_type), intent(in) :: law
       type(partial_moments_type), intent(in) :: moments
-      integer, intent(in) :: order
 
-      real(wp) :: b, place, slope, density, number, s, w, kept, lost, left, first(3)
+      real(wp) :: b, place, slope, density, number, s, w, kept, lost, left, first(2)
       real(wp), allocatable :: scaled(:)
       type(nodes_type) :: nodes
       integer :: knot, one, node
@@ -181,11 +174,11 @@ contains
          b = self%coordinate%threshold(place)
          if (knot == 1) b = self%lowest
          slope = self%coordinate%slope(place) * self%step_b
-         call self%place_nodes(law, moments, order, b, moments%max_threshold, &
+         call self%place_nodes(law, moments, b, moments%max_threshold, &
             & b - first_s * self%width, nodes)
-         ! As the density has no values at the lowest threshold itself.
+         ! The density is not defined at the lowest threshold itself.
          density = law%density(b * (1.0_wp + epsilon(b)) + tiny(b))
-         number = number_above(moments, order, b)
+         number = number_above(moments, b)
          scaled(:nodes%count) = exp((b - nodes%threshold(:nodes%count)) / self%width)
          do one = 1, knots_s
             s = first_s + (one - 1) * step_s
@@ -195,14 +188,13 @@ contains
             do node = 1, nodes%count
                w = exp(-s) * scaled(node)
                kept = exp(-w)
-               lost = lost + nodes%share(node) * merge(1.0_wp - kept, w * (1.0_wp - 0.5_wp * w &
-                  & * (1.0_wp - w / 3.0_wp)), w > 1.0e-3_wp)
+               lost = lost + nodes%share(node) * lost_part(w, kept)
                left = left + nodes%share(node) * kept
                first(1) = first(1) + nodes%share(node) * w * kept
                first(2) = first(2) + nodes%share(node) * w**2 * kept
             end do
             w = exp(-s)
-            call slopes(number, density * slope, slope / self%width, w, lost, left, first(:2), &
+            call slopes(number, density * slope, slope / self%width, w, lost, left, first, &
                & self%table(:, one, knot))
          end do
       end do
@@ -210,11 +202,11 @@ contains
 
    !> The logarithm of -ln(M/S), and its slopes at fixed b and at fixed s.
    pure subroutine slopes(number, density, scale, w, lost, left, moment, values)
-      !> Number without activation, its density, and one over theta, both over the knots of b
+      !> Number without activation; its density and one over theta, both over the knots of b
       real(wp), intent(in) :: number, density, scale
-      !> Hazard at b, what it breaks of the number and what it leaves
+      !> Hazard at b, number that it breaks, and number that survives
       real(wp), intent(in) :: w, lost, left
-      !> Means of the hazard and of its square of what is left
+      !> Sums of the hazard and of its square over the survivors
       real(wp), intent(in) :: moment(2)
       real(wp), intent(out) :: values(4)
 
@@ -236,7 +228,7 @@ contains
       values(4) = step_s * (by_both / hazard - (by_s / hazard) * (by_b / hazard))
    end subroutine slopes
 
-   !> ln(1 + x), to the last digits for small x.
+   !> ln(1 + x), accurate for small x.
    elemental function log_of_one_plus(x) result(logarithm)
       real(wp), intent(in) :: x
       real(wp) :: logarithm
@@ -248,12 +240,11 @@ contains
       if (abs(sum - 1.0_wp) > 0.0_wp) logarithm = log(sum) * (x / (sum - 1.0_wp))
    end function log_of_one_plus
 
-   !> Tabulate what is left of contacts that do not depend on b over the level.
-   subroutine tabulate_free(self, law, moments, order)
+   !> Tabulate survivors that do not depend on b over the level.
+   subroutine tabulate_free(self, law, moments)
       class(survivors_type), intent(inout) :: self
       class(threshold_law_type), intent(in) :: law
       type(partial_moments_type), intent(in) :: moments
-      integer, intent(in) :: order
 
       real(wp), allocatable :: found(:, :), more(:, :)
       real(wp) :: first, last, to
@@ -263,19 +254,19 @@ contains
       last = self%highest + late * self%width
       allocate (found(3, 256))
       count = 1
-      found(:, 1) = self%free_at(law, moments, order, first)
+      found(:, 1) = self%free_at(law, moments, first)
       do cell = 1, first_cells
-         ! In the coordinate of the law, as its density varies, beyond the lowest threshold.
+         ! Above the lowest threshold in the coordinate of the law, as its density varies.
          to = self%lowest
          if (cell > 1) to = self%coordinate%threshold(self%first_b + (cell - 1) &
             & * (self%coordinate%at(last) - self%first_b) / (first_cells - 1))
-         call refine(found(:, count), self%free_at(law, moments, order, to), max_halvings)
+         call refine(found(:, count), self%free_at(law, moments, to), max_halvings)
       end do
       self%free = found(:, :count)
 
    contains
 
-      !> Add the knots of a cell, half of it after half where its interpolation is not good enough.
+      !> Add the knots of a cell, halved until its interpolation is accurate.
       recursive subroutine refine(start, end, halvings)
          real(wp), intent(in) :: start(3), end(3)
          integer, intent(in) :: halvings
@@ -285,7 +276,7 @@ contains
          left = start
          length = end(1) - left(1)
          if (halvings > 0 .and. count < max_knots) then
-            middle = self%free_at(law, moments, order, left(1) + 0.5_wp * length)
+            middle = self%free_at(law, moments, left(1) + 0.5_wp * length)
             guess = 0.5_wp * (left(2) + end(2)) + 0.125_wp * length * (left(3) - end(3))
             if (abs(guess - middle(2)) > tolerance * (1.0_wp + exp(min(middle(2), 0.0_wp)))) then
                call refine(left, middle, halvings - 1)
@@ -305,11 +296,10 @@ contains
    end subroutine tabulate_free
 
    !> A level, the logarithm of -ln(M/S) there, and its slope.
-   function free_at(self, law, moments, order, level) result(values)
+   function free_at(self, law, moments, level) result(values)
       class(survivors_type), intent(in) :: self
       class(threshold_law_type), intent(in) :: law
       type(partial_moments_type), intent(in) :: moments
-      integer, intent(in) :: order
       real(wp), intent(in) :: level
       real(wp) :: values(3)
 
@@ -317,15 +307,14 @@ contains
       real(wp) :: w, kept, lost, left, slope, hazard
       integer :: node
 
-      call self%place_nodes(law, moments, order, self%lowest, moments%max_threshold, level, nodes)
+      call self%place_nodes(law, moments, self%lowest, moments%max_threshold, level, nodes)
       lost = 0.0_wp
       left = nodes%rest
       slope = 0.0_wp
       do node = 1, nodes%count
          w = exp(min(700.0_wp, (level - nodes%threshold(node)) / self%width))
          kept = exp(-w)
-         lost = lost + nodes%share(node) * merge(1.0_wp - kept, w * (1.0_wp - 0.5_wp * w &
-            & * (1.0_wp - w / 3.0_wp)), w > 1.0e-3_wp)
+         lost = lost + nodes%share(node) * lost_part(w, kept)
          left = left + nodes%share(node) * kept
          slope = slope + nodes%share(node) * w * kept
       end do
@@ -337,13 +326,11 @@ contains
       values = [level, log(hazard), slope / self%width / max(left, tiny(left)) / hazard]
    end function free_at
 
-   !> How many contacts are left.
+   !> Surviving number of the contacts that activation would leave unbroken, given the threshold up
+   !> to which contacts broke at once.
    pure function left(self, broken, level, number)
       class(survivors_type), intent(in) :: self
-      !> Threshold at or below which contacts broke at once, and the level
-      real(wp), intent(in) :: broken, level
-      !> Number without activation
-      real(wp), intent(in) :: number
+      real(wp), intent(in) :: broken, level, number
       real(wp) :: left
 
       left = number
@@ -449,19 +436,24 @@ contains
       end do
    end subroutine tabulate_loss
 
-   !> Part that breaks of contacts whose threshold is at z theta above the level.
+   !> Broken part of the contacts whose threshold is z theta above the level.
    elemental function lost_at(z) result(part)
       real(wp), intent(in) :: z
       real(wp) :: part
 
-      real(wp) :: w
-
-      w = exp(-z)
-      part = 1.0_wp - exp(-w)
-      if (w < 1.0e-3_wp) part = w * (1.0_wp - 0.5_wp * w * (1.0_wp - w / 3.0_wp))
+      part = lost_part(exp(-z), exp(-exp(-z)))
    end function lost_at
 
-   !> Integral of the part that breaks, from z upwards.
+   !> Broken part of the contacts with the integrated hazard w, given the part exp(-w) that
+   !> survives.
+   elemental function lost_part(w, kept) result(part)
+      real(wp), intent(in) :: w, kept
+      real(wp) :: part
+
+      part = merge(1.0_wp - kept, w * (1.0_wp - 0.5_wp * w * (1.0_wp - w / 3.0_wp)), w > 1.0e-3_wp)
+   end function lost_part
+
+   !> Integral of the broken part from z upwards.
    pure function loss_above(self, z) result(loss)
       class(survivors_type), intent(in) :: self
       real(wp), intent(in) :: z

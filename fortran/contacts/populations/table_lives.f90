@@ -3,7 +3,7 @@
 !> A population that attached with the force phi breaks forward in the order of x_s - phi/k, and
 !> backward in that of x_s + phi/k. If stiffnesses differ these are two orders, so that no threshold
 !> separates the survivors: they depend on how far the slider was ahead of the origin and behind it.
-!> Dimensionless as in mesoslip_contacts_mechanics.
+!> Distances, forces and moments are relative, as in mesoslip_contacts_mechanics.
 module mesoslip_contacts_populations_table_lives
    use mesoslip_contacts_life_moments, only: life_moments_type, new_life_moments
    use mesoslip_contacts_stretch_cells, only: stretch_cells_type
@@ -13,11 +13,11 @@ module mesoslip_contacts_populations_table_lives
 
    public :: table_lives_type, new_table_lives, newborn_law, unforced_law, weighted_law
 
-   !> Laws of populations that bear no force where they attached, as many in each stretch and with
-   !> the weight of one over the break stretch; those of each force at attaching and its opposite
-   !> follow
+   !> Laws of populations without force at attaching, evenly spread in stretch: of all contacts, and
+   !> weighted by one over the breaking stretch. Those of each force at attaching and of its
+   !> opposite follow
    integer, parameter :: unforced_law = 1, weighted_law = 2
-   !> Moments of stiffness and life, and their places
+   !> Moments of stiffness and life, and their positions
    integer, parameter :: orders = 6
    integer, parameter :: stiffness_power(orders) = [0, 1, -1, 2, 0, 1]
    integer, parameter :: life_power(orders) = [0, 0, 0, 0, 1, 2]
@@ -25,9 +25,9 @@ module mesoslip_contacts_populations_table_lives
 
    !> Contacts that attached with a force.
    type :: forced_type
-      !> The force, positive in the direction in which they are followed
+      !> The force, positive in the direction in which breaks are counted
       real(wp) :: force = 0.0_wp
-      !> Contacts that it does not break, and their moments
+      !> Contacts that survive the force, and their moments
       type(stretch_cells_type) :: cells
       type(life_moments_type) :: moments
    end type forced_type
@@ -40,22 +40,15 @@ module mesoslip_contacts_populations_table_lives
       !> Mean of the squared stiffness of all contacts
       real(wp), private :: mean_square = 1.0_wp
    contains
-      !> Distances after which the first and the last contacts break
-      procedure, non_overridable :: shortest
-      procedure, non_overridable :: longest
-      !> Number, stiffness, one over it, twice the energy lost in breaking and mass of what is left
-      procedure, non_overridable :: left
-      !> Distance of which contacts in the other direction are left
-      procedure, non_overridable :: min_opposite
+      procedure, non_overridable :: shortest, longest, left, min_opposite
       procedure, non_overridable, private :: sum_cells
    end type table_lives_type
 
 contains
 
-   !> Set up what is left of the contacts of a table.
+   !> Set up the survival of the contacts of a table.
    subroutine new_table_lives(self, cells, mean_square, force)
       type(table_lives_type), intent(out) :: self
-      !> The table
       type(stretch_cells_type), intent(in) :: cells
       !> Mean of the squared stiffness, to which the mean mass belongs
       real(wp), intent(in) :: mean_square
@@ -90,18 +83,16 @@ contains
       end do
    end subroutine new_table_lives
 
-   !> Law of a population that attached with one of the forces.
+   !> Law of a population that attached with one of the forces in a direction of motion.
    pure function newborn_law(class, direction) result(law)
-      !> Which force, and the direction of motion then
       integer, intent(in) :: class
       real(wp), intent(in) :: direction
-      !> Its law
       integer :: law
 
       law = weighted_law + 2 * class - merge(1, 0, direction > 0.0_wp)
    end function newborn_law
 
-   !> The same contacts in the other direction.
+   !> Law of the same contacts in the other direction.
    pure function opposite(law)
       integer, intent(in) :: law
       integer :: opposite
@@ -110,13 +101,11 @@ contains
       if (law > weighted_law) opposite = law + merge(1, -1, modulo(law - weighted_law, 2) == 1)
    end function opposite
 
-   !> Distance after which the first contacts of a law break.
+   !> Distance in a direction after which the first contacts of a law break.
    pure function shortest(self, law, direction) result(distance)
       class(table_lives_type), intent(in) :: self
-      !> The law, and the direction
       integer, intent(in) :: law
       real(wp), intent(in) :: direction
-      !> Relative distance
       real(wp) :: distance
 
       distance = self%law(merge(law, opposite(law), direction > 0.0_wp))%moments%shortest
@@ -125,23 +114,17 @@ contains
    !> Distance after which the last contacts of a law break, forward.
    pure function longest(self, law) result(distance)
       class(table_lives_type), intent(in) :: self
-      !> The law
       integer, intent(in) :: law
-      !> Relative distance
       real(wp) :: distance
 
       distance = self%law(law)%moments%longest
    end function longest
 
-   !> Distance in one direction up to which none breaks of what is left after one in the other.
+   !> Distance in the other direction up to which no contact breaks that survived a distance in one.
    pure function min_opposite(self, law, direction, distance) result(opposite_distance)
       class(table_lives_type), intent(in) :: self
-      !> The law, and the direction in which contacts broke
       integer, intent(in) :: law
-      real(wp), intent(in) :: direction
-      !> Maximum distance in that direction
-      real(wp), intent(in) :: distance
-      !> Relative distance in the other one
+      real(wp), intent(in) :: direction, distance
       real(wp) :: opposite_distance
 
       real(wp) :: force
@@ -152,14 +135,12 @@ contains
          & / merge(self%max_stiffness, self%min_stiffness, force > 0.0_wp)
    end function min_opposite
 
-   !> Surviving fraction of a population.
+   !> Moments of the survivors after maximum distances of the slider ahead of the origin and behind
+   !> it: number, stiffness, one over it, twice the energy lost in breaking, and mass.
    pure subroutine left(self, law, ahead, behind, moments)
       class(table_lives_type), intent(in) :: self
-      !> Its law
       integer, intent(in) :: law
-      !> Maximum distances of the slider ahead of the origin and behind it
       real(wp), intent(in) :: ahead, behind
-      !> Number, stiffness, one over it, twice the energy lost in breaking, and mass
       real(wp), intent(out) :: moments(5)
 
       real(wp) :: all(orders), weighted(orders + 1), force
@@ -184,7 +165,7 @@ contains
          & + force**2 * all(inverse_k), all(k_squared) / self%mean_square]
    end subroutine left
 
-   !> Surviving fraction of a population where some contacts depend on either direction.
+   !> The same where survival depends on both distances.
    pure subroutine sum_cells(self, law, ahead, behind, moments)
       class(table_lives_type), intent(in) :: self
       integer, intent(in) :: law

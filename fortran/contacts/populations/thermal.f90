@@ -1,19 +1,18 @@
-!> Breaks of pinned populations by thermal activation while the slider moves.
+!> Breaks of pinned populations by thermal activation in a motion of the slider.
 !>
-!> Contacts of all populations break all the time. What is left of a population follows from the
-!> maximum force on it and the level of its hazard, so that it does not depend on steps. Of what
-!> breaks in a step, the contacts that come to their thresholds go with the displacement of the
-!> slider, the others with the time.
+!> Contacts of all populations break all the time. The contacts that remain of a population follow
+!> from the maximum force on it and the level of its hazard, independently of steps. In a step, the
+!> contacts that reach their thresholds break with the displacement of the slider, the others with
+!> the time.
 module mesoslip_contacts_populations_thermal
    use mesoslip_contacts_populations_activation, only: activation_type, growth_type
    use mesoslip_contacts_populations_breaking, only: breaking_populations_type, tiny_gap, &
-      & trial_type, unresolved_part
+      & unresolved_part
    use mesoslip_contacts_populations_nodes, only: new_threshold_nodes, threshold_nodes_type
    use mesoslip_contacts_populations_rows, only: column_ahead, column_behind, column_birth, &
       & column_broken, column_force, column_level, column_origin, column_weight, moments_length, &
       & number
-   use mesoslip_contacts_populations_survivors, only: new_survivors, no_level, &
-      & survivors_type
+   use mesoslip_contacts_populations_survivors, only: new_survivors, no_level, survivors_type
    use mesoslip_interface_law, only: pose_type
    use mesoslip_numerics_errors, only: error_type
    use mesoslip_numerics_kinds, only: wp
@@ -22,7 +21,7 @@ module mesoslip_contacts_populations_thermal
 
    public :: thermal_populations_type, joining_part
 
-   !> Part of a population that has broken, beyond which no contacts join it any more
+   !> Broken part of a population up to which contacts may join it
    real(wp), parameter :: max_joined_loss = 0.01_wp
    !> Displacement in which contacts join a population, over that of a step
    real(wp), parameter :: joining_part = 0.5_wp
@@ -35,34 +34,24 @@ module mesoslip_contacts_populations_thermal
       !> Whether they do, and how
       logical :: is_thermal = .false.
       type(activation_type) :: activation
-      !> Fraction of contacts that survives it, and of those whose thresholds change with age
+      !> Surviving fraction of contacts without ageing, and with it
       type(survivors_type), private :: survivors
       type(threshold_nodes_type), private :: nodes
       !> Time in which contacts join a population [s]
       real(wp), private :: joining_time = huge(1.0_wp)
    contains
-      !> Let contacts break by activation
-      procedure, non_overridable :: set_activation
-      !> Find what breaks in a motion
-      procedure, non_overridable :: try_motion
-      !> Let contacts that attach join the last population
-      procedure, non_overridable :: join_last
-      !> Whether contacts may join a population
-      procedure, non_overridable :: may_join
-      !> Note what a population has gone through while it attached
-      procedure, non_overridable :: begin_hazard
+      procedure, non_overridable :: set_activation, try_motion, join_last, may_join, begin_hazard
       procedure, non_overridable, private :: break_one, number_left, thresholds_reached, &
          & first_break_force
    end type thermal_populations_type
 
 contains
 
-   !> Let contacts break by activation.
+   !> Let contacts break by activation, with the length of a step over the spread of the breaking
+   !> stretches.
    subroutine set_activation(self, activation, resolution)
       class(thermal_populations_type), intent(inout) :: self
-      !> How they do
       type(activation_type), intent(in) :: activation
-      !> Length of a step over the spread of the breaking stretches
       real(wp), intent(in) :: resolution
 
       self%is_thermal = .true.
@@ -74,19 +63,17 @@ contains
             & activation%width)
          allocate (self%kept(self%nodes%count, size(self%population, 1)), source=1.0_wp)
       else
-         call new_survivors(self%survivors, self%parameters%law, self%moments(1), number, &
-            & activation%width)
+         call new_survivors(self%survivors, self%parameters%law, self%moments(1), activation%width)
       end if
    end subroutine set_activation
 
-   !> Find what breaks in a motion of the slider.
+   !> Find what breaks in a motion of the slider, and at thresholds until it reaches a displacement
+   !> [m], which is not less far.
    subroutine try_motion(self, before, after, displacement, late, onset, error)
       class(thermal_populations_type), intent(inout) :: self
-      !> Pose of the slider, and where it comes to
       type(pose_type), intent(in) :: before, after
-      !> Displacement until which contacts are found that come to their thresholds, not less far [m]
       real(wp), intent(in) :: displacement
-      !> Breaks of populations that start to come to their thresholds, and where most of them do [m]
+      !> Breaks of populations that start to reach their thresholds, and where most of them do [m]
       real(wp), intent(out) :: late, onset
       !> Set if there is not enough memory; nothing breaks then
       type(error_type), allocatable, intent(inout) :: error
@@ -100,19 +87,20 @@ contains
       column = merge(column_ahead, column_behind, direction > 0.0_wp)
       late = 0.0_wp
       onset = displacement
-      call self%make_room_to_try(error)
+      call self%begin_trial(before, displacement, after%time, direction, error)
       if (allocated(error)) return
       growth = self%activation%growth(before, after)
       edge = direction * before%displacement + tiny_gap * self%step
       max_breaks = 0.0_wp
       associate (trial => self%trial, population => self%population)
-         trial%end = displacement
-         trial%time = after%time
-         trial%direction = direction
-         trial%reach = abs(displacement - before%displacement)
          trial%next = direction * huge(1.0_wp)
          trial%count = self%count
-         call clear_sums(trial)
+         trial%breaks = 0.0_wp
+         trial%work = 0.0_wp
+         trial%drop = 0.0_wp
+         trial%cut_breaks = 0.0_wp
+         trial%cut_work = 0.0_wp
+         trial%cut_drop = 0.0_wp
          do row = 1, self%count
             associate (held => self%left(number, row))
                start = force_at(before%displacement)
@@ -156,14 +144,13 @@ contains
 
    contains
 
-      !> Force on the contacts of a population.
-      pure function force_at(place) result(force)
-         !> Displacement of the slider [m]
-         real(wp), intent(in) :: place
+      !> Force on the contacts of the population where the slider is at a displacement [m].
+      pure function force_at(displacement) result(force)
+         real(wp), intent(in) :: displacement
          real(wp) :: force
 
          force = self%population(row, column_force) &
-            & + (place - self%population(row, column_origin)) / self%stretch
+            & + (displacement - self%population(row, column_origin)) / self%stretch
       end function force_at
 
    end subroutine try_motion
@@ -171,14 +158,13 @@ contains
    !> Find what breaks of a population.
    subroutine break_one(self, row, growth, before, after, forces, cut, left)
       class(thermal_populations_type), intent(inout) :: self
-      !> Which one, and what the motion adds to levels
       integer, intent(in) :: row
+      !> Increase of levels in the motion
       type(growth_type), intent(in) :: growth
       type(pose_type), intent(in) :: before, after
-      !> Forces on the contacts before and after, and to which contacts are found that come to their
-      !> thresholds
+      !> Forces on the contacts before and after, and where breaks at thresholds end
       real(wp), intent(in) :: forces(3)
-      !> Fraction of its contacts that survives the motion without activation, and with it
+      !> Number of contacts that would survive without activation, and that survive
       real(wp), intent(out) :: cut, left
 
       real(wp) :: moments(moments_length)
@@ -217,11 +203,10 @@ contains
       end associate
    end subroutine break_one
 
-   !> Configured threshold of the contacts of a population whose thresholds are reached.
+   !> Configured threshold of the contacts that break under a force at a time [s].
    pure function thresholds_reached(self, row, force, time) result(threshold)
       class(thermal_populations_type), intent(in) :: self
       integer, intent(in) :: row
-      !> Force on the contacts, and when that is [s]
       real(wp), intent(in) :: force, time
       real(wp) :: threshold
 
@@ -230,12 +215,12 @@ contains
          & max(0.0_wp, time - self%population(row, column_birth)))
    end function thresholds_reached
 
-   !> Force along the direction at which the first contacts of a population reach their thresholds.
+   !> Force at which the first contacts of a population reach their thresholds, between those before
+   !> the motion and at its end, all along the direction.
    pure function first_break_force(self, row, before, start, last) result(force)
       class(thermal_populations_type), intent(in) :: self
       integer, intent(in) :: row
       type(pose_type), intent(in) :: before
-      !> Forces before the motion and at its end
       real(wp), intent(in) :: start, last
       real(wp) :: force
 
@@ -269,18 +254,6 @@ contains
       end associate
    end function number_left
 
-   !> Set the sums over what breaks to zero.
-   pure subroutine clear_sums(trial)
-      type(trial_type), intent(inout) :: trial
-
-      trial%breaks = 0.0_wp
-      trial%cut_breaks = 0.0_wp
-      trial%work = 0.0_wp
-      trial%cut_work = 0.0_wp
-      trial%drop = 0.0_wp
-      trial%cut_drop = 0.0_wp
-   end subroutine clear_sums
-
    !> Mean square of a force that changes evenly.
    elemental function mean_square(first, second)
       real(wp), intent(in) :: first, second
@@ -289,13 +262,12 @@ contains
       mean_square = (first**2 + first * second + second**2) / 3.0_wp
    end function mean_square
 
-   !> Whether contacts may join a population: hardly any of it have broken, and it is not older.
+   !> Whether contacts that attached at a time [s] may join a population: only a small part of it
+   !> has broken, and it is not much older.
    pure function may_join(self, row, birth)
       class(thermal_populations_type), intent(in) :: self
-      !> Which one, and when the contacts attached [s]
       integer, intent(in) :: row
       real(wp), intent(in) :: birth
-      !> Whether they may
       logical :: may_join
 
       real(wp) :: moments(moments_length)
@@ -306,12 +278,11 @@ contains
          & .and. birth - self%population(row, column_birth) <= self%joining_time
    end function may_join
 
-   !> Note what the contacts of a population have gone through since they attached.
+   !> Set the hazard that a population has had in the time [s] since its contacts attached, under a
+   !> force.
    subroutine begin_hazard(self, row, duration, force)
       class(thermal_populations_type), intent(inout) :: self
-      !> Which one
       integer, intent(in) :: row
-      !> The time since then [s], and the force on them
       real(wp), intent(in) :: duration, force
 
       self%population(row, column_level) = self%activation%newborn_level(duration, force)
@@ -322,13 +293,12 @@ contains
    !> Let contacts that attach join a population that attached close by.
    subroutine join_last(self, row, origin, birth, contacts, force, displacement, time, energy)
       class(thermal_populations_type), intent(inout) :: self
-      !> Which population
       integer, intent(in) :: row
-      !> Where and when they attach [m] and [s], how many they are, and the force on them
+      !> Where [m] and when [s] they attach, their number, and the force on them
       real(wp), intent(in) :: origin, birth, contacts, force
       !> Displacement of the slider [m], and time [s]
       real(wp), intent(in) :: displacement, time
-      !> Elastic energy that is lost by giving all of them one origin [J]
+      !> Elastic energy, to which that lost by giving all contacts one origin is added [J]
       real(wp), intent(inout) :: energy
 
       real(wp) :: below(2), part, high, all, level
@@ -344,7 +314,7 @@ contains
             & + part * (origin - population(row, column_origin))
          high = max(level, population(row, column_level))
          if (high > no_level) then
-            ! Without a hazard a level is far below, and its quotient would overflow.
+            ! Without a hazard a level is far below, and its exponent would overflow.
             below = max([level, population(row, column_level)] - high, -max_exponent * width) &
                & / width
             population(row, column_level) = high + width &

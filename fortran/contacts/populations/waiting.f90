@@ -1,8 +1,8 @@
-!> Contacts whose delays are exponential: what part of them attaches in a step, and when on average.
+!> Contacts with exponential delays: the part of them that attaches in a step, and its mean time.
 !>
-!> The ratio h is that of the duration of a step to the mean delay; times within the step are over
-!> its duration. Of what is detached at the start the part 1 - exp(-h) attaches; of what breaks
-!> evenly in the step it is 1 - (1 - exp(-h))/h. Short steps have series: differences lose digits.
+!> The ratio h is that of the duration of a step to the mean delay; times are over the duration. Of
+!> the contacts detached at the start the part 1 - exp(-h) attaches; of those that break evenly in
+!> the step the part 1 - (1 - exp(-h))/h. Short steps have series, as differences lose digits.
 module mesoslip_contacts_populations_waiting
    use mesoslip_numerics_kinds, only: wp
    implicit none
@@ -10,19 +10,17 @@ module mesoslip_contacts_populations_waiting
 
    public :: attached_part, own_attached_part, mean_attached_time, mean_own_time
 
-   !> Ratio below which there is a series, and its terms
+   !> Ratio below which there is a series, and its number of terms
    real(wp), parameter :: short = 0.5_wp
    integer, parameter :: terms = 16
-   !> Ratio beyond which all has attached
+   !> Ratio beyond which all contacts have attached
    real(wp), parameter :: long = 700.0_wp
 
 contains
 
-   !> Part that attaches of what is detached at the start.
+   !> Part that attaches of the contacts detached at the start.
    elemental function attached_part(ratio) result(part)
-      !> Duration over the mean delay
       real(wp), intent(in) :: ratio
-      !> The part
       real(wp) :: part
 
       if (ratio < short) then
@@ -32,11 +30,9 @@ contains
       end if
    end function attached_part
 
-   !> Part that attaches of what breaks evenly in the step.
+   !> Part that attaches of the contacts that break in the step.
    elemental function own_attached_part(ratio) result(part)
-      !> Duration over the mean delay
       real(wp), intent(in) :: ratio
-      !> The part
       real(wp) :: part
 
       if (ratio < short) then
@@ -46,22 +42,18 @@ contains
       end if
    end function own_attached_part
 
-   !> Mean time at which the first of these attach, over the duration.
+   !> Mean time at which the former attach, 1/2 for short steps.
    elemental function mean_attached_time(ratio) result(time)
-      !> Duration over the mean delay
       real(wp), intent(in) :: ratio
-      !> The time, 1/2 for short steps
       real(wp) :: time
 
       time = 0.5_wp
       if (ratio > 0.0_wp) time = 1.0_wp - own_attached_part(ratio) / attached_part(ratio)
    end function mean_attached_time
 
-   !> Mean time at which the second of these attach, over the duration.
+   !> Mean time at which the latter attach, 2/3 for short steps.
    elemental function mean_own_time(ratio) result(time)
-      !> Duration over the mean delay
       real(wp), intent(in) :: ratio
-      !> The time, 2/3 for short steps
       real(wp) :: time
 
       time = 2.0_wp / 3.0_wp
@@ -74,10 +66,9 @@ contains
       end if
    end function mean_own_time
 
-   !> 1 - exp(-h), or the integral of s**(order - 1) (1 - exp(-h s)) over s from 0 to 1.
+   !> 1 - exp(-h) for order 0, or the integral of s**(order - 1) (1 - exp(-h s)) over s from 0 to 1.
    elemental function series(ratio, order) result(total)
       real(wp), intent(in) :: ratio
-      !> 0, or the order of the integral
       integer, intent(in) :: order
       real(wp) :: total
 

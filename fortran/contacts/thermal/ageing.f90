@@ -1,6 +1,6 @@
 !> Contacts that break by thermal activation, whose thresholds change with their age.
 !>
-!> The rate of breaking then depends on the age of a contact, and clocks are not shared as they are.
+!> The rate of breaking then depends on the age of a contact, so that contacts cannot share a clock.
 !> A contact has the key of a lower bound on its threshold, for which the rate is too high. Where it
 !> reaches that key, it breaks with a probability, the ratio of its rate to that of the bound;
 !> otherwise it draws another deviate (P. Lewis and G. Shedler, Naval Research Logistics Quarterly

@@ -101,7 +101,7 @@ contains
       end if
    end subroutine plan
 
-   !> The same with clocks.
+   !> Offer the law of a motion with clocks.
    subroutine offer_by_clocks(self, pose, law, window)
       class(thermal_contacts_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose

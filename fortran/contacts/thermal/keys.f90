@@ -1,9 +1,9 @@
 !> Contacts that break by thermal activation: their clocks, keys and order.
 !>
 !> A contact belongs to the clock of the sign of its force. Its key is the reading at which it
-!> breaks, relative to a reference displacement that is moved along with the slider. In the
-!> direction ahead, which is kept until an event on the way back, the next event of a contact is its
-!> break at the threshold or a change of the sign of its force. On the way back events are bounded.
+!> breaks, relative to a reference displacement that is moved along with the slider. The direction
+!> ahead is kept until an event on the way back. Ahead, the next event of a contact is its break at
+!> the threshold or a change of the sign of its force; on the way back events are bounded.
 module mesoslip_contacts_thermal_keys
    use mesoslip_contacts_individual_base, only: exchange_individual, individual_contacts_type
    use mesoslip_contacts_individual_record, only: row_limit, row_origin, row_stiffness

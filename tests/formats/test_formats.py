@@ -124,7 +124,7 @@ def test_a_folder_that_is_no_store_stays(folder, tmp_path):
     place = tmp_path / "mine.zarr"
     place.mkdir()
     (place / "data").write_text("mine")
-    with pytest.raises(mesoslip.FileError, match="is no Zarr store"):
+    with pytest.raises(mesoslip.FileError, match="is not a Zarr store"):
         mesoslip.export(folder / "run.nc", place)
     assert (place / "data").read_text() == "mine"
     with pytest.raises(mesoslip.FileError, match=r"\.zarr \(Zarr\) or \.xml"):

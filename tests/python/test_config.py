@@ -374,6 +374,12 @@ def test_units_that_are_known(text, unit, value):
     assert to_si(text, unit, "5 ms") == value
 
 
+@pytest.mark.parametrize("unit", ["A", "mol", "cd", "K*mol", "K*A/mol"])
+def test_units_of_dimensions_that_no_key_has_are_not_kelvins(unit):
+    with pytest.raises(ValueError, match=re.escape(f"has the unit {unit}; expected")):
+        to_si(f"300 {unit}", "K", "300 K")
+
+
 def test_units_mean_what_they_mean_to_pint():
     """All our prefixes before all our units."""
     registry = pint.UnitRegistry(cache_folder=None)

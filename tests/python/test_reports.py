@@ -215,10 +215,10 @@ def test_what_a_file_says_is_no_markup(klein, tmp_path):
 def test_what_a_run_did_not_keep_stands_out(klein_run, tmp_path):
     tree = klein_run.copy()
     tree.attrs |= {"audit": "the balance does not close", "complete": "false"}
-    tree.attrs["comment"] = "interrupted; it came to 3 s"
+    tree.attrs["comment"] = "interrupted; it reached 3 s"
     text, page = written(tree, tmp_path / "report.html")
     assert text.count('class="warns"') == 2
-    assert "interrupted; it came to 3 s" in page.words
+    assert "interrupted; it reached 3 s" in page.words
 
 
 def test_the_command_writes_a_page(tmp_path, command):
@@ -229,5 +229,5 @@ def test_the_command_writes_a_page(tmp_path, command):
     assert (tmp_path / "run.html").exists()
     status, _, errors = command("report", output, "-o", output)
     assert status == 2
-    assert "is what the command reads" in errors
+    assert "is read by the command" in errors
     assert command("report", tmp_path / "none.nc")[0] == 2

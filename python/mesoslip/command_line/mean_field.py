@@ -42,7 +42,7 @@ def mean_field(
 
     checked = load(config, changes)
     if output is not None and output.resolve() == Path(config).resolve():
-        raise FileError(f"{output}: is what the command reads; give another name")
+        raise FileError(f"{output}: is read by the command; give another name")
     field = measure(checked)
     written = () if output is None else field.write(output, FIRST if first else STEADY)
     if as_json:

@@ -40,7 +40,7 @@ EXACT = decimal.Context(prec=60, Emax=decimal.MAX_EMAX, Emin=decimal.MIN_EMIN, t
 
 
 class Unit(NamedTuple):
-    """A unit: its size in SI, and its powers of metre, kilogram, second, and others."""
+    """A unit: its size in SI, and its powers of metre, kilogram, second and kelvin."""
 
     factor: Decimal
     dimension: tuple[float, ...]
@@ -48,17 +48,19 @@ class Unit(NamedTuple):
 
 # Units that take any prefix.
 SI = {
-    "m": Unit(Decimal(1), (1, 0, 0)),
-    "g": Unit(Decimal("1e-3"), (0, 1, 0)),
-    "s": Unit(Decimal(1), (0, 0, 1)),
-    "N": Unit(Decimal(1), (1, 1, -2)),
-    "Pa": Unit(Decimal(1), (-1, 1, -2)),
-    "J": Unit(Decimal(1), (2, 1, -2)),
-    "W": Unit(Decimal(1), (2, 1, -3)),
-    "Hz": Unit(Decimal(1), (0, 0, -1)),
+    "m": Unit(Decimal(1), (1, 0, 0, 0)),
+    "g": Unit(Decimal("1e-3"), (0, 1, 0, 0)),
+    "s": Unit(Decimal(1), (0, 0, 1, 0)),
+    "N": Unit(Decimal(1), (1, 1, -2, 0)),
+    "Pa": Unit(Decimal(1), (-1, 1, -2, 0)),
+    "J": Unit(Decimal(1), (2, 1, -2, 0)),
+    "W": Unit(Decimal(1), (2, 1, -3, 0)),
+    "Hz": Unit(Decimal(1), (0, 0, -1, 0)),
     "K": Unit(Decimal(1), (0, 0, 0, 1)),
 }
-NONE = Unit(Decimal(1), (0, 0, 0))
+NONE = Unit(Decimal(1), (0, 0, 0, 0))
+# Their bases, as pint names them.
+DIMENSIONS = ("[length]", "[mass]", "[time]", "[temperature]")
 
 
 def number_of(text: str, decimal: str = ".") -> float:
@@ -153,21 +155,16 @@ def _unit(text: str) -> Unit | None:
         if match is None or factor is None:
             return None
         power = sign * int(match["exponent"] or 1)
+        dimensions = zip(unit.dimension, factor.dimension, strict=True)
         unit = Unit(
             EXACT.multiply(unit.factor, EXACT.power(factor.factor, power)),
-            _added(unit.dimension, factor.dimension, power),
+            tuple(product + power * one for product, one in dimensions),
         )
         rest = rest[match.end() :]
         if not rest:
             return unit
         sign = -1 if rest[0] == "/" else 1
         rest = rest[1:] if rest[0] in "/*·" else rest
-
-
-def _added(one: tuple[float, ...], other: tuple[float, ...], times: int) -> tuple[float, ...]:
-    length = max(len(one), len(other))
-    one, other = (part + (0,) * (length - len(part)) for part in (one, other))
-    return tuple(first + times * second for first, second in zip(one, other, strict=True))
 
 
 def _named(name: str) -> Unit | None:
@@ -200,10 +197,9 @@ def _named_by_pint(name: str) -> Unit | None:
     if zero.magnitude != 0:
         return None
     powers: dict[str, Any] = dict(one.dimensionality)
-    known = tuple(float(powers.pop(f"[{base}]", 0)) for base in ("length", "mass", "time"))
-    # No key of a configuration has other dimensions.
-    dimension = known + ((1.0,) if powers else ())
-    return Unit(Decimal(one.magnitude), dimension)
+    dimension = tuple(float(powers.pop(base, 0)) for base in DIMENSIONS)
+    # No key of a configuration has other dimensions: NaN differs from all powers.
+    return Unit(Decimal(one.magnitude), (math.nan,) * len(DIMENSIONS) if powers else dimension)
 
 
 def cf_units(unit: str) -> str:

@@ -1,4 +1,4 @@
-"""Configuration, groups and origin of an output in memory."""
+"""Origin, configuration and groups of an output in memory."""
 
 from __future__ import annotations
 
@@ -13,18 +13,13 @@ if TYPE_CHECKING:
 
 
 def is_measured(tree: Tree) -> bool:
-    """Whether an output is a measured trace, and no run."""
+    """Whether an output is a measured trace instead of a run."""
     return bool(tree.attrs.get("origin") == "measured")
 
 
 def config_of(tree: Tree, name: str = "the output") -> Config:
-    """The configuration of an output.
-
-    Raises
-    ------
-    FileError
-        If it has none of a run, as a measured trace read without one.
-    """
+    """The configuration of an output; a `FileError` if it is not that of a run, as of a measured
+    trace that was read without one."""
     try:
         return Config.from_toml(tree.attrs["configuration"])
     except ConfigError:
@@ -43,10 +38,9 @@ def group_of(tree: Tree, name: str) -> xr.Dataset | Arrays: ...
 
 
 def group_of(tree: Tree, name: str) -> xr.Dataset | Arrays:
-    """A group of an output alone, without the coordinates of the root that it does not use.
+    """A group of an output, without the coordinates of the root that it does not use.
 
-    So that `xarray.Dataset.to_dataframe` has a row for each row of the group, not for each pair of
-    it and a time of the trace.
+    With them, `xarray.Dataset.to_dataframe` would repeat each row for every time of the trace.
     """
     if isinstance(tree, Arrays):
         return tree.children[name]
@@ -55,7 +49,7 @@ def group_of(tree: Tree, name: str) -> xr.Dataset | Arrays:
 
 
 def trace_suffixes(posterior: xr.DataTree) -> list[str]:
-    """Suffixes of the groups of each trace of a fit: "" of the first, "_2" of the second."""
+    """Suffixes of the groups of the traces of a fit: "" for the first, "_2" for the second."""
     found, number = [""], 2
     while f"observed_data_{number}" in posterior.children:
         found.append(f"_{number}")

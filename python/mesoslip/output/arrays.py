@@ -1,7 +1,7 @@
-"""Outputs as plain arrays: what commands for small files need of xarray, which is slow to import.
+"""Outputs as plain arrays, for commands that do without xarray, which is slow to import.
 
-Groups and variables here have the names that xarray's have for the same, as far as they go. The
-variables are in a file (`Stored`) or in memory (`Values`).
+Groups and variables have the part of xarray's interface that these commands need. Variables are in
+a file (`Stored`) or in memory (`Values`).
 """
 
 from __future__ import annotations
@@ -24,22 +24,12 @@ if TYPE_CHECKING:
 
 Array = NDArray[Any]
 
-# Attributes of variables whose values are not what is stored.
+# Attributes of variables whose stored values must be decoded.
 ENCODINGS = {"missing_value", "scale_factor", "add_offset", "_Unsigned"}
 
 
 class Variable(Protocol):
-    """A variable of a group.
-
-    Attributes
-    ----------
-    dims
-        Names of its dimensions.
-    values
-        Its values.
-    attrs
-        Its attributes.
-    """
+    """A variable of a group."""
 
     @property
     def dims(self) -> tuple[str, ...]: ...
@@ -51,14 +41,13 @@ class Variable(Protocol):
     def attrs(self) -> Mapping[str, Any]: ...
 
     @property
-    def dtype(self) -> np.dtype[Any]:
-        """Type of its values."""
+    def dtype(self) -> np.dtype[Any]: ...
 
     def isel(self, part: Mapping[str, Any] | None = None, **by_name: Any) -> Variable:
-        """A part of it, by indices along dimensions that are whole."""
+        """A part of it, by indices along dimensions that are not indexed yet."""
 
     def __getitem__(self, index: Any) -> Variable:
-        """A part along the first dimension, or along the first ones with several indices."""
+        """A part of it, by one index or a tuple of them along the first dimensions."""
 
 
 @dataclass(frozen=True)
@@ -71,37 +60,27 @@ class Values:
 
     @property
     def dtype(self) -> np.dtype[Any]:
-        """Type of its values."""
         return self.values.dtype
 
     def isel(self, part: Mapping[str, Any] | None = None, **by_name: Any) -> Values:
-        """A part of it, by indices along dimensions."""
         part = {**(part or {}), **by_name}
         return self[tuple(part.get(one, slice(None)) for one in self.dims)]
 
     def __getitem__(self, index: Any) -> Values:
-        """A part along the first dimension, or along the first ones with several indices."""
         indices = index if isinstance(index, tuple) else (index,)
-        left = tuple(
+        remaining = tuple(
             name
             for number, name in enumerate(self.dims)
             if number >= len(indices) or not isinstance(indices[number], int | np.integer)
         )
-        return Values(left, np.asarray(self.values[indices]), self.attrs)
+        return Values(remaining, np.asarray(self.values[indices]), self.attrs)
 
 
 @dataclass(frozen=True)
 class Stored:
-    """A variable in a file, whose values are read when they are needed, or a part of one.
+    """A variable in a file, or a part of it, whose values are read when needed; see `Variable`.
 
-    Attributes
-    ----------
-    stored
-        The whole variable.
-    attrs
-        Its attributes.
-    part
-        What is left of dimensions, as NumPy indexes them, by their names.
+    ``part`` has the indices by dimension.
     """
 
     stored: netCDF4.Variable[Any]
@@ -110,40 +89,35 @@ class Stored:
 
     @property
     def dims(self) -> tuple[str, ...]:
-        """Names of its dimensions, without those of which one index is left."""
         names = self.stored.dimensions
         return tuple(one for one in names if not isinstance(self.part.get(one), int | np.integer))
 
     @property
     def dtype(self) -> np.dtype[Any]:
-        """Type of its values."""
         found: np.dtype[Any] = self.stored.dtype
         return found
 
     @cached_property
     def values(self) -> Array:
-        """Its values."""
         index = tuple(self.part.get(one, slice(None)) for one in self.stored.dimensions)
         with LOCK:
-            # A variable without dimensions takes no empty index.
+            # The library refuses an empty index, which a variable without dimensions has.
             return np.asarray(self.stored[index or ...])
 
     def isel(self, part: Mapping[str, Any] | None = None, **by_name: Any) -> Stored:
-        """A part of it, by indices along dimensions that are whole."""
         part = {**(part or {}), **by_name}
         assert not self.part.keys() & part.keys()
         own = {name: index for name, index in part.items() if name in self.stored.dimensions}
         return Stored(self.stored, self.attrs, {**self.part, **own})
 
     def __getitem__(self, index: Any) -> Stored:
-        """A part along the first dimension, or along the first ones with several indices."""
         indices = index if isinstance(index, tuple) else (index,)
         return self.isel(dict(zip(self.dims, indices, strict=False)))
 
 
 @dataclass(frozen=True)
 class Arrays(Mapping[str, Variable]):
-    """A group of an output: its variables by name, its attributes, and the groups in it."""
+    """A group of an output: its variables by name, its attributes, and its groups."""
 
     variables: Mapping[str, Variable]
     sizes: Mapping[str, int]
@@ -161,7 +135,7 @@ class Arrays(Mapping[str, Variable]):
 
     @property
     def coords(self) -> Mapping[str, Variable]:
-        """The variables that are named as a dimension."""
+        """The variables with the name of a dimension."""
         return {name: one for name, one in self.variables.items() if name in self.sizes}
 
     @property
@@ -174,25 +148,19 @@ class Arrays(Mapping[str, Variable]):
         return self
 
     def isel(self, part: Mapping[str, Any] | None = None, **by_name: Any) -> Arrays:
-        """A part of all variables, by indices along dimensions that are whole."""
+        """A part of all variables; see `Variable.isel`."""
         part = {**(part or {}), **by_name}
         sizes = {}
         for name, size in self.sizes.items():
-            left = np.arange(size)[part.get(name, slice(None))]
-            if left.ndim:
-                sizes[name] = left.size
+            remaining = np.arange(size)[part.get(name, slice(None))]
+            if remaining.ndim:
+                sizes[name] = remaining.size
         variables = {name: one.isel(part) for name, one in self.variables.items()}
         return Arrays(variables, sizes, self.attrs)
 
 
 def in_xarray(arrays: Arrays) -> xr.DataTree:
-    """A group and those in it as a tree of datasets.
-
-    Parameters
-    ----------
-    arrays
-        Groups with variables in memory.
-    """
+    """A group with variables in memory, and the groups in it, as a tree of datasets."""
     import xarray as xr
 
     variables = {
@@ -202,15 +170,13 @@ def in_xarray(arrays: Arrays) -> xr.DataTree:
     return xr.DataTree(xr.Dataset(variables, attrs=dict(arrays.attrs)), children=children)
 
 
-# An output of which no more is used than both have.
+# An output, of which only the common interface is used.
 Tree: TypeAlias = "Arrays | xr.DataTree"
 
 
 def arrays_of(group: netCDF4.Dataset) -> Arrays | None:
-    """A group of a file and all groups in it; None if one has values that must be decoded.
-
-    Outputs have none, but files that other programs have made of them may.
-    """
+    """A group of a file and all groups in it; None if values must be decoded, as in files that
+    other programs have made from outputs."""
     name = group.path.strip("/")
     if not all(map(_is_plain, group.variables.values())):
         return None
@@ -235,7 +201,7 @@ def _attributes(owner: netCDF4.Dataset | netCDF4.Variable[Any]) -> dict[str, Any
 
 
 def _is_plain(variable: netCDF4.Variable[Any]) -> bool:
-    """Whether the values of a variable are the stored ones."""
+    """Whether the stored values of a variable need no decoding."""
     names = set(variable.ncattrs())
     kind = getattr(variable.dtype, "kind", "")
     if kind not in "fiu" or kind == "" or names & ENCODINGS:

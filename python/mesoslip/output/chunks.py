@@ -1,7 +1,7 @@
-"""Values put into the chunks of a file, arranged and compressed on several threads.
+"""Chunks of a file, arranged and compressed on several threads.
 
-The library of HDF5 does all of that on one thread. Chunks that are made here are stored as they
-are, and read by any program as if the library had made them.
+The library of HDF5 would do that on one thread. It stores finished chunks as they are, and any
+program reads them as usual.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ COMPRESSION_LEVEL = 1
 
 @dataclass(frozen=True)
 class _Target:
-    """A variable of a file; without `chunks`, its values lie in one piece."""
+    """A variable of a file, in chunks or contiguous."""
 
     dataset: h5py.Dataset
     chunks: tuple[int, ...] | None
@@ -45,7 +45,7 @@ class _Target:
         return cls(dataset, dataset.chunks, dataset.dtype, dataset.fillvalue, is_compressed)
 
     def packed(self, where: tuple[Any, ...], values: Array) -> _Piece:
-        """Values as they are stored; this does not use the library of HDF5."""
+        """Values as they are stored, without use of HDF5's library."""
         if self.chunks is None:
             return _Piece(self.dataset, where, values.astype(self.dtype, copy=False))
         chunk = np.empty(self.chunks, self.dtype)
@@ -61,7 +61,7 @@ class _Target:
 
 @dataclass(frozen=True)
 class _Piece:
-    """Values on their way to a variable: an array, or a chunk as it is stored."""
+    """Values to be written to a variable: an array, or a chunk as it is stored."""
 
     dataset: h5py.Dataset
     where: tuple[Any, ...]
@@ -76,22 +76,9 @@ class _Piece:
 
 
 def write_chunks(path: Path, blocks: Iterable[Block], threads: int) -> None:
-    """Write blocks to the variables of a netCDF-4 file.
+    """Write blocks to the variables of a netCDF-4 file, arranged and compressed on threads.
 
-    Parameters
-    ----------
-    path
-        The file. Variables in chunks have those of `mesoslip.output.filling.block_rows`, shuffled
-        if they are compressed.
-    blocks
-        The values.
-    threads
-        Threads that arrange and compress them; only the thread of the caller uses the file.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be written.
+    Chunks of variables must have the rows of `filling.block_rows`, and be shuffled if compressed.
     """
     with _Storage(path, "r+") as storage:
         with h5py.File(storage, "r+") as file:
@@ -105,30 +92,23 @@ def write_chunks(path: Path, blocks: Iterable[Block], threads: int) -> None:
 
 
 class _Storage(FileIO):
-    """A file as the library of HDF5 uses it, which does not learn of writes that fail.
+    """A file that hides failed writes from HDF5's library, which would crash as it closes the file.
 
-    It would crash if it could not write its own entries as it closes the file.
-
-    Attributes
-    ----------
-    error
-        The first error, after which nothing is written.
+    After the first ``error`` nothing is written.
     """
 
     error: OSError | None = None
 
     def write(self, values: Buffer) -> int:
-        """Write all values, or none after an error; their number."""
-        left = memoryview(values)
+        remaining = memoryview(values)
         try:
-            while left and self.error is None:
-                left = left[super().write(left) :]
+            while remaining and self.error is None:
+                remaining = remaining[super().write(remaining) :]
         except OSError as error:
             self.error = error
         return len(memoryview(values))
 
     def truncate(self, size: int | None = None) -> int:
-        """Set the size of the file."""
         try:
             if self.error is None:
                 return super().truncate(size)
@@ -153,7 +133,7 @@ def _with_targets(
 def _in_order(
     jobs: Iterable[tuple[Block, dict[str, _Target]]], threads: int
 ) -> Iterator[list[_Piece]]:
-    """Blocks as they are stored, made on threads, a few ahead of the one that is written."""
+    """Blocks as they are stored, computed on threads a few blocks ahead."""
     if threads == 1:
         for block, targets in jobs:
             yield _packed(block, targets)
@@ -173,6 +153,6 @@ def _packed(block: Block, targets: dict[str, _Target]) -> list[_Piece]:
 
 
 def _compressed(chunk: Array) -> bytes:
-    """A chunk after the filters of HDF5 for shuffling bytes and for zlib."""
+    """A chunk after HDF5's filters shuffle and zlib."""
     each = chunk.reshape(-1, 1).view(np.uint8)
     return zlib.compress(np.ascontiguousarray(each.T).data, COMPRESSION_LEVEL)

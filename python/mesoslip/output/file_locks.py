@@ -1,4 +1,4 @@
-"""Locks of file systems, which the library of netCDF wants of a file."""
+"""Locks of file systems, which netCDF's library needs to open a file."""
 
 from __future__ import annotations
 
@@ -8,16 +8,14 @@ from contextlib import suppress
 from pathlib import Path
 
 NO_LOCKS = (
-    "its file system gives no locks ({}); the environment variable HDF5_USE_FILE_LOCKING=FALSE "
-    "does without them"
+    "its file system has no locks ({}); the environment variable HDF5_USE_FILE_LOCKING=FALSE "
+    "turns them off"
 )
 
 
 def lock_held(path: Path) -> str:
-    """The reason why the library may have been refused a lock on a file; empty if it was not.
-
-    The library reports a refused lock like a damaged file.
-    """
+    """The reason for which a lock on a file may be refused, or empty; the library reports a refused
+    lock like a damaged file."""
     try:
         with path.open("rb") as file:
             fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
@@ -29,7 +27,7 @@ def lock_held(path: Path) -> str:
 
 
 def refused_lock(folder: Path) -> str:
-    """The error of the file system of a folder when asked for a lock; empty if it grants it."""
+    """The error of a lock in a folder; empty if its file system grants it."""
     with suppress(OSError), tempfile.TemporaryFile(dir=folder) as file:
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -25,10 +25,10 @@ if TYPE_CHECKING:
 # Objects built from a file.
 T = TypeVar("T", bound=Tree)
 
-# Memory for chunks of each variable that is read; the library's own is 64 MB.
+# Memory for chunks of each variable [bytes]; the library's default is 64 MB.
 CHUNK_CACHE = 2**22
 
-# Errors of the libraries that read a damaged file.
+# Errors of the libraries for a damaged file.
 DAMAGES = (
     ArithmeticError,
     AttributeError,
@@ -42,13 +42,9 @@ DAMAGES = (
 
 @contextmanager
 def opened(path: str | Path) -> Iterator[xr.DataTree]:
-    """An output of any command; data are read when they are used.
+    """An output of any command; data are read when needed.
 
-    Raises
-    ------
-    FileError
-        If there is no such file, it is not an output of mesoslip, it is damaged, or it refers to
-        other files.
+    A `FileError` if it is not an output, is damaged, or refers to other files.
     """
     with _opened(path, _tree) as tree:
         yield tree
@@ -56,7 +52,7 @@ def opened(path: str | Path) -> Iterator[xr.DataTree]:
 
 @contextmanager
 def opened_arrays(path: str | Path) -> Iterator[Tree]:
-    """An output of ``mesoslip run`` without xarray, for what `Arrays` has; see `opened_for`."""
+    """An output of ``mesoslip run`` without xarray; see `opened_for`."""
     with opened_for(path, lambda _: True) as tree:
         check_run(tree, path)
         yield tree
@@ -64,10 +60,7 @@ def opened_arrays(path: str | Path) -> Iterator[Tree]:
 
 @contextmanager
 def opened_for(path: str | Path, is_enough: Callable[[Arrays], bool]) -> Iterator[Tree]:
-    """An output of any command without xarray, if `Arrays` is enough; see `opened`.
-
-    A file whose values must be decoded is read by xarray.
-    """
+    """An output of any command as `Arrays` if that is enough, and no values must be decoded."""
 
     def build(file: netCDF4.Dataset) -> Tree:
         found = arrays_of(file)
@@ -79,7 +72,7 @@ def opened_for(path: str | Path, is_enough: Callable[[Arrays], bool]) -> Iterato
 
 @contextmanager
 def _opened(path: str | Path, build: Callable[[netCDF4.Dataset], T]) -> Iterator[T]:
-    """Objects built from the groups of a file; see `opened`."""
+    """An object built from the groups of a file; see `opened`."""
     path = Path(path)
     if is_directory(path):
         raise FileError(f"{path}: is a directory, not an output file")
@@ -94,14 +87,14 @@ def _opened(path: str | Path, build: Callable[[netCDF4.Dataset], T]) -> Iterator
         try:
             yield tree
         except (OSError, RuntimeError) as error:
-            # Data that are read later may be damaged.
+            # The data read later may be damaged.
             if "NetCDF" in str(error) or "HDF" in str(error):
                 raise FileError(f"{path}: a damaged netCDF-4 file") from error
             raise
 
 
 def _built(path: Path, stack: ExitStack, build: Callable[[netCDF4.Dataset], T]) -> T:
-    """Objects built from a file, which has small chunk caches and is closed with a stack."""
+    """An object built from a file with small chunk caches, which the stack closes."""
     with LOCK:
         before = netCDF4.get_chunk_cache()
         netCDF4.set_chunk_cache(CHUNK_CACHE)
@@ -114,7 +107,7 @@ def _built(path: Path, stack: ExitStack, build: Callable[[netCDF4.Dataset], T]) 
 
 
 def _tree(file: netCDF4.Dataset) -> xr.DataTree:
-    """All groups of a file, with the names of today."""
+    """All groups of a file, with present names of variables."""
     import xarray as xr
     from xarray.backends import NetCDF4DataStore
 
@@ -123,7 +116,7 @@ def _tree(file: netCDF4.Dataset) -> xr.DataTree:
     while found:
         group = found.pop(0)
         found += group.groups.values()
-        # Data are read later with this lock too.
+        # Data are also read later with this lock.
         data = xr.open_dataset(store(group, lock=LOCK))
         groups[group.path] = renamed(group.path.strip("/"), data)
     return xr.DataTree.from_dict(groups)
@@ -159,13 +152,7 @@ def opened_run(path: str | Path) -> Iterator[xr.DataTree]:
 
 
 def check_run(tree: Tree, path: str | Path) -> None:
-    """Make sure that an output is of ``mesoslip run``.
-
-    Raises
-    ------
-    FileError
-        If it is not.
-    """
+    """Refuse an output that is not of ``mesoslip run``."""
     if not has_force(tree.data_vars):
         kind = " but of mesoslip sweep" if "status" in tree.data_vars else ""
         raise FileError(f"{path}: not an output of mesoslip run{kind}")
@@ -173,31 +160,31 @@ def check_run(tree: Tree, path: str | Path) -> None:
 
 def is_of_another(path: Path, config: Config) -> bool:
     """Whether there is an output of another configuration at a path."""
-    try:
-        check_signature(path)
-        check_links(path)
-        with LOCK, netCDF4.Dataset(path) as file:
-            return bool(file.getncattr("configuration") != config.to_toml())
-    # There is none, it is another kind of file, or its name is none that the library takes.
-    except (OSError, AttributeError, UnicodeError, FileError):
-        return False
+    found = _attribute(path, "configuration")
+    return found is not None and found != config.to_toml()
 
 
 def remove_partial(path: Path) -> None:
-    """Remove the output of a run or a sweep that was stopped, if there is one at a path."""
+    """Remove the output of an interrupted run or sweep, if there is one at a path."""
+    if _attribute(path, "complete") == "false":
+        path.unlink(missing_ok=True)
+
+
+def _attribute(path: Path, name: str) -> str | None:
+    """A text attribute of an output; None if it is missing, or there is no output at the path."""
     try:
         check_signature(path)
         check_links(path)
         with LOCK, netCDF4.Dataset(path) as file:
-            is_partial = file.getncattr("complete") == "false"
+            found = file.getncattr(name)
+            return found if isinstance(found, str) else None
+    # UnicodeError: the library cannot encode the path.
     except (OSError, AttributeError, UnicodeError, FileError):
-        return
-    if is_partial:
-        path.unlink(missing_ok=True)
+        return None
 
 
 def configuration(path: Path, overrides: Iterable[str] = ()) -> Config:
-    """The configuration of an output, to run it again, with changes laid over it."""
+    """The configuration of an output, with changes applied."""
     with opened(path) as tree:
         text, base = (tree.attrs.get(name) for name in ("configuration", "base_configuration"))
     return Config.from_toml(str(text), str(path), overrides, base)

@@ -18,30 +18,18 @@ if TYPE_CHECKING:
 Array = NDArray[Any]
 
 
-# Numbers in a block of rows, the part of a table in memory during writing.
+# Maximum numbers and rows in a block, the part of a table in memory during writing.
 BLOCK_NUMBERS = 2**19
-
 BLOCK_ROWS = 2**16
-
-
-def longest(results: Results) -> int:
-    """Index of the realization with the longest trace, which has the times of all."""
-    return int(np.argmax([len(one.rows("trace")) for one in results.realizations]))
 
 
 @dataclass(frozen=True)
 class Block:
-    """Rows of a table, and the variables of a group that they fill.
+    """Rows of a table, in parts with the indices of their realizations, and the variables of a
+    group that they fill.
 
-    Attributes
-    ----------
-    group
-        Name of the group.
-    entries
-        The variables by name.
-    where
-        Index of the rows in a variable: the realization, if the variables have that dimension, and
-        a slice that starts at a multiple of `block_rows`.
+    The index of the rows in a variable, ``where``, is the realization, if variables have that
+    dimension, and a slice that starts at a multiple of `block_rows`.
     """
 
     group: str
@@ -51,9 +39,9 @@ class Block:
     owners: Sequence[int]
 
     def values(self) -> Iterator[tuple[str, tuple[Any, ...], Array]]:
-        """Each variable with its name, the index and the values."""
+        """The name, index and values of each variable."""
         shape = (sum(map(len, self.parts)), *self.parts[0].shape[1:])
-        # The values of a column lie side by side.
+        # Columns are contiguous.
         rows = np.concatenate(self.parts, out=np.empty(shape, order="F"))
         owners = np.repeat(self.owners, [len(part) for part in self.parts])
         for name, entry in self.entries.items():
@@ -62,31 +50,16 @@ class Block:
             yield name, where, entry.pick(rows, owners)
 
 
-def fill(
-    results: Results,
-    layout: Mapping[str, GroupLayout],
-    destinations: Mapping[str, Mapping[str, Array]],
-) -> None:
-    """Copy the values of an output to their destinations by group and name."""
-    for group, form in layout.items():
-        for name, entry in form.entries.items():
-            if not entry.table and np.size(entry.values):
-                destinations[group][name][...] = np.asarray(entry.values, dtype=entry.dtype)
-    for block in blocks(results, layout):
-        for name, where, values in block.values():
-            destinations[block.group][name][where] = values
-
-
 def blocks(results: Results, layout: Mapping[str, GroupLayout]) -> Iterator[Block]:
-    """The rows of all tables of an output; each block is there once."""
-    timekeeper = longest(results)
+    """The rows of all tables of an output, each once."""
+    longest = int(np.argmax([len(one.rows("trace")) for one in results.realizations]))
     for group, form in layout.items():
         for table in dict.fromkeys(entry.table for entry in form.entries.values() if entry.table):
             of_table = {name: one for name, one in form.entries.items() if one.table == table}
-            # The times are those of the longest trace.
+            # The times, which have no dimension realization, are those of the longest trace.
             padded = {name: one for name, one in of_table.items() if one.is_padded}
             for where, parts, owners in _joined(results, table):
-                is_whole = len(where) == 1 or where[0] == timekeeper
+                is_whole = len(where) == 1 or where[0] == longest
                 entries = of_table if is_whole else padded
                 yield Block(group, entries, where, parts, owners)
 
@@ -106,7 +79,7 @@ def _joined(
 ) -> Iterator[tuple[tuple[Any, ...], list[Array], list[int]]]:
     """Blocks of a table: index in the output, pieces of rows, the realization of each piece.
 
-    Short realizations are joined in tables of all realizations, and apart in the others.
+    Catalogues have the rows of all realizations one after another.
     """
     max_rows, is_ragged = block_rows(results.config, table), table in DIMENSIONS
     start = count = 0
@@ -115,9 +88,9 @@ def _joined(
     for number, one in enumerate(results.realizations):
         before = () if is_ragged else (number,)
         for piece in one.rows(table).blocks(max_rows):
-            left = piece
-            while len(left):
-                part, left = left[: max_rows - count], left[max_rows - count :]
+            remaining = piece
+            while len(remaining):
+                part, remaining = remaining[: max_rows - count], remaining[max_rows - count :]
                 parts.append(part)
                 owners.append(number)
                 count += len(part)

@@ -1,4 +1,4 @@
-"""HDF5 below netCDF-4: one lock for its library, and files that are whole in themselves."""
+"""HDF5 below netCDF-4: a lock for its library, and a check that files are self-contained."""
 
 from __future__ import annotations
 
@@ -8,21 +8,14 @@ from typing import Any
 
 from mesoslip.errors import FileError
 
-# The library is not safe to use on several threads. All that opens, reads, writes or closes a file
-# holds this lock.
+# The library is not thread-safe: this lock is held while a file is opened, read, written or closed.
 LOCK = threading.RLock()
 
 
 def check_links(path: Path) -> None:
-    """Make sure that a file refers to nothing outside of it, and that its groups are a tree.
+    """Refuse a file with soft or external links, data in other files, or two names of one object.
 
-    Links are looked at, not followed: behind them may be a file of somebody else, or one that never
-    ends.
-
-    Raises
-    ------
-    FileError
-        If it has soft or external links, data in other files, or an object with two names.
+    Links are not followed: they may lead to files of others, or to one without end.
     """
     import h5py
 

@@ -22,15 +22,7 @@ OutputLike: TypeAlias = "PathLike | xr.DataTree | xr.Dataset"
 
 
 def as_config(config: ConfigLike, overrides: Iterable[str] = ()) -> Config:
-    """A configuration from a TOML file, from an output of an earlier run, or from nested tables.
-
-    Raises
-    ------
-    FileError
-        If a file cannot be read.
-    ConfigError
-        If the configuration is wrong.
-    """
+    """A configuration from a TOML file, from an output of an earlier run, or from nested tables."""
     if isinstance(config, Config):
         return config
     if isinstance(config, Mapping):
@@ -40,7 +32,7 @@ def as_config(config: ConfigLike, overrides: Iterable[str] = ()) -> Config:
         raise ConfigError([Problem("", "config", message, config)])
     path = Path(config)
     if path.suffix == ".nc":
-        # With netCDF, which takes long to import.
+        # This and the following functions import netCDF only when needed, as it is slow to import.
         from mesoslip.output import files
 
         return files.configuration(path, overrides)
@@ -61,24 +53,12 @@ def open_output(path: PathLike) -> xr.DataTree:
 
 
 def as_output(output: OutputLike) -> xr.DataTree:
-    """An output of any command in memory.
-
-    Raises
-    ------
-    FileError
-        If it cannot be read, or is not an output.
-    """
+    """An output of any command in memory."""
     return open_output(output) if isinstance(output, str | os.PathLike) else _tree(output)
 
 
 def as_run(output: OutputLike) -> xr.DataTree:
-    """An output of a run in memory.
-
-    Raises
-    ------
-    FileError
-        If it cannot be read, or is not an output of a run.
-    """
+    """An output of a run in memory."""
     from mesoslip.output import files
 
     if isinstance(output, str | os.PathLike):
@@ -90,7 +70,7 @@ def as_run(output: OutputLike) -> xr.DataTree:
 
 @contextmanager
 def opened_run(output: OutputLike) -> Iterator[tuple[xr.DataTree, str]]:
-    """An output of a run, read when used, and its name for messages."""
+    """An output of a run, read when needed, and its name for messages."""
     from mesoslip.output import files
 
     if isinstance(output, str | os.PathLike):
@@ -102,13 +82,7 @@ def opened_run(output: OutputLike) -> Iterator[tuple[xr.DataTree, str]]:
 
 @contextmanager
 def opened_run_arrays(output: OutputLike) -> Iterator[Tree]:
-    """An output of a run, read when used, without xarray if it is in a file.
-
-    Raises
-    ------
-    FileError
-        If it cannot be read, or is not an output of a run.
-    """
+    """An output of a run, read when needed, without xarray if it is in a file."""
     from mesoslip.output import files
 
     if isinstance(output, str | os.PathLike):
@@ -119,14 +93,14 @@ def opened_run_arrays(output: OutputLike) -> Iterator[Tree]:
 
 
 def trace_name(output: OutputLike, tree: xr.DataTree) -> str:
-    """A short name of an output with a trace: that of its file, or of the measured file."""
+    """A short name of an output with a trace, from its file or the measured file."""
     if isinstance(output, str | os.PathLike):
         return Path(output).stem
     return str(tree.attrs.get("measured_file", tree.attrs.get("title", "trace")))
 
 
 def several(output: OutputLike | Sequence[OutputLike]) -> Sequence[OutputLike]:
-    """Outputs, of which there may be one."""
+    """One or several outputs as a sequence."""
     if isinstance(output, str | os.PathLike) or not isinstance(output, Sequence):
         return [output]
     return output
@@ -137,16 +111,9 @@ def opened(
     stack: ExitStack,
     is_enough: Callable[[Arrays], bool] = lambda _: False,
 ) -> tuple[list[xr.DataTree], list[str]]:
-    """Outputs of any command, read when used, and their names.
+    """Outputs of any command, read when needed, and their names; the stack closes files.
 
-    Parameters
-    ----------
-    outputs
-        The outputs.
-    stack
-        Closes files.
-    is_enough
-        Whether no more is used of an output in a file than `Arrays` has; it is read so then.
+    Files are read as `Arrays` if that is enough.
     """
     from mesoslip.output import files
 
@@ -167,7 +134,7 @@ def _tree(output: object) -> xr.DataTree:
     import xarray as xr
 
     if isinstance(output, xr.Dataset):
-        # That of a sweep, which has no groups.
+        # The dataset of a sweep, without groups.
         return xr.DataTree(output)
     if not isinstance(output, xr.DataTree):
         raise FileError(f"{shown(output)}: is not an output; give its path or its DataTree")

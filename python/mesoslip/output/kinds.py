@@ -1,6 +1,6 @@
-"""Kinds of outputs: one for each command.
+"""Kinds of outputs, one for each command.
 
-A new kind is a line here, its default view in `mesoslip.plots.views` (of the same name), and its
+A new kind needs a line here, a default view of the same name in `mesoslip.plots.views`, and its
 sections in `mesoslip.reports.sections`.
 """
 
@@ -15,13 +15,13 @@ from mesoslip.output.variables import has_force
 
 
 class Kind(NamedTuple):
-    """A kind of output: its name with an article, and whether an output is of it."""
+    """A kind of output: its name with an article, and a test whether an output is of it."""
 
     description: str
     is_of: Callable[[Tree], bool]
 
 
-# The kind of an output is the first that fits.
+# The first kind whose test holds is that of an output.
 KINDS = {
     "run": Kind("a run", lambda tree: has_force(tree.data_vars)),
     "sweep": Kind("a sweep", lambda tree: "status" in tree.data_vars),
@@ -38,13 +38,7 @@ KINDS = {
 
 
 def kind_of(tree: Tree) -> str:
-    """The kind of an output, a name in `KINDS`.
-
-    Raises
-    ------
-    FileError
-        If it is of no known kind.
-    """
+    """The kind of an output, a name in `KINDS`."""
     for name, kind in KINDS.items():
         if kind.is_of(tree):
             return name
@@ -53,15 +47,9 @@ def kind_of(tree: Tree) -> str:
 
 
 def kind_of_all(trees: Sequence[Tree], names: Sequence[str]) -> str:
-    """The kind of outputs that go into one picture, or on one page.
-
-    Raises
-    ------
-    FileError
-        If they are of several kinds.
-    """
+    """The common kind of outputs for one picture or page; a `FileError` if there are several."""
     kinds = {kind_of(tree): name for tree, name in zip(trees, names, strict=True)}
     if len(kinds) > 1:
         found = ", ".join(f"{name} is {KINDS[kind].description}" for kind, name in kinds.items())
-        raise FileError(f"outputs of different commands do not go together: {found}")
+        raise FileError(f"outputs of different commands cannot be combined: {found}")
     return next(iter(kinds))

@@ -1,10 +1,10 @@
 """The layout of the output of a run: its groups, and how rows of the kernel become variables.
 
-`describe` has the contents of an output; `mesoslip.output.tree` builds it in memory, and
+`describe` returns it; `mesoslip.output.tree` builds the output in memory, and
 `mesoslip.output.writing` writes it to a file block by block.
 
-Rows of catalogues name their realization by a ``realization_index``, as CF's indexed ragged arrays
-do, and no variable of a group has the name of a coordinate of the root.
+Rows of catalogues have a ``realization_index``, as in CF's indexed ragged arrays, and no variable
+of a group has the name of a coordinate of the root.
 """
 
 from __future__ import annotations
@@ -28,16 +28,26 @@ if TYPE_CHECKING:
 
 Array = NDArray[Any]
 
+# Dimension of the rows of a table in its catalogue.
+DIMENSIONS = {
+    "slips": "slip",
+    "stages": "stage",
+    "slip_trace": "sample",
+    "avalanches": "avalanche",
+    "snapshot_events": "snapshot",
+    "snapshots": "snapshot",
+}
+
 # Values of a variable from rows of a table and the indices of their realizations.
 Pick = Callable[[Array, Array], Array]
 
 
 @dataclass(frozen=True)
 class Entry:
-    """A variable of an output: its form, and the values or the rows that fill it.
+    """A variable of an output: its form, and its values or the rows that fill it.
 
-    Those with dimensions (realization, time, ...) are filled realization by realization, and NaN
-    where one ended earlier; others take the rows of all realizations one after another.
+    Those with dimensions (realization, time, ...) are padded with NaN where a realization ended
+    earlier; others have the rows of all realizations one after another.
     """
 
     dimensions: tuple[str, ...]
@@ -59,10 +69,8 @@ class Entry:
 
     @property
     def shrinks(self) -> bool:
-        """Whether compression pays.
-
-        Real numbers with full mantissas shrink to two thirds, at half the cost of their simulation.
-        """
+        """Whether it is compressed: most real numbers would shrink to two thirds only, at half the
+        cost of their simulation."""
         return self.dtype.kind != "f" or self.meaning.is_regular
 
 
@@ -92,21 +100,34 @@ def column(table: str, name: str) -> Pick:
     return lambda rows, _: rows[:, number]
 
 
-@dataclass
-class _Form:
-    """Entries of a group, under construction."""
+class _GroupBuilder:
+    """Entries of a group, under construction; those of a catalogue come from one table."""
 
-    group: Group
-    is_exact: bool
-    entries: dict[str, Entry]
+    def __init__(self, results: Results, group: Group, table: str = "") -> None:
+        self.entries: dict[str, Entry] = {}
+        self._group, self._table = group, table
+        self._is_exact = results.config.contact_kind.is_discrete
+        if table:
+            self._rows = sum(len(one.rows(table)) for one in results.realizations)
+            self.add_column("realization_index", lambda _, owners: owners)
 
     def add(
-        self, name: str, dimensions: tuple[str, ...], *, can_lack: bool = False, **how: Any
+        self, name: str, dimensions: tuple[str, ...], *, has_gaps: bool = False, **how: Any
     ) -> None:
-        meaning = self.group[name]
-        is_real = can_lack or (meaning.is_fractional and not self.is_exact)
+        """Add a variable; one with gaps is real, for NaN."""
+        meaning = self._group[name]
+        is_real = has_gaps or (meaning.is_fractional and not self._is_exact)
         dtype = np.dtype(np.float64 if is_real else meaning.dtype)
         self.entries[name] = Entry(dimensions, meaning, dtype, **how)
+
+    def add_column(self, name: str, source: str | Pick = "", **how: Any) -> None:
+        """Add a variable from a column of the table, of the same name by default."""
+        pick = column(self._table, source or name) if isinstance(source, str) else source
+        self.add(name, (DIMENSIONS[self._table],), table=self._table, pick=pick, **how)
+
+    def catalogue(self, **sizes: int) -> GroupLayout:
+        """The layout of the group, with further dimensions."""
+        return GroupLayout({DIMENSIONS[self._table]: self._rows, **sizes}, self.entries, {})
 
 
 def describe(results: Results) -> dict[str, GroupLayout]:
@@ -123,39 +144,34 @@ def describe(results: Results) -> dict[str, GroupLayout]:
     return layout
 
 
-# Traces that only some sliders have.
+# Traces of some sliders only.
 SPECIAL_TRACES = ("elastic_force", "base_displacement")
 
 
 def recorded(config: Config) -> tuple[str, ...]:
-    """Names of the traces that an output of a configuration has, without the time."""
+    """Names of the traces in an output of a configuration, without the time."""
     common = (name for name in tables.TRACE_COLUMNS if name not in ("time", *SPECIAL_TRACES))
     return (*common, *config.slider.extra_traces)
 
 
-def _count(results: Results, table: str) -> int:
-    return sum(len(one.rows(table)) for one in results.realizations)
-
-
 def _root(results: Results) -> GroupLayout:
     config, realizations = results.config, results.realizations
-    writer = _Form(variables.ROOT, config.contact_kind.is_discrete, {})
+    group = _GroupBuilder(results, variables.ROOT)
     lengths = [len(one.rows("trace")) for one in realizations]
     sizes = {"realization": len(realizations), "time": max(lengths)}
     each, at_times = ("realization",), ("realization", "time")
-    writer.add("realization", each, is_coordinate=True, values=[one.number for one in realizations])
-    writer.add("time", ("time",), is_coordinate=True, table="trace", pick=column("trace", "time"))
-    can_lack = min(lengths) < max(lengths)
+    group.add("realization", each, is_coordinate=True, values=[one.number for one in realizations])
+    group.add("time", ("time",), is_coordinate=True, table="trace", pick=column("trace", "time"))
+    has_gaps = min(lengths) < max(lengths)
     for name in recorded(config):
         pick = column("trace", name)
-        writer.add(name, at_times, can_lack=can_lack, table="trace", pick=pick)
+        group.add(name, at_times, has_gaps=has_gaps, table="trace", pick=pick)
     layers = config.slider.layers_recorded(config)
     if layers:
         sizes["layer"] = layers
-        numbers = np.arange(1, sizes["layer"] + 1)
-        writer.add("layer", ("layer",), is_coordinate=True, values=numbers)
+        group.add("layer", ("layer",), is_coordinate=True, values=np.arange(1, layers + 1))
         where = (*at_times, "layer")
-        writer.add("layer_displacement", where, table="layers", pick=lambda rows, _: rows)
+        group.add("layer_displacement", where, table="layers", pick=lambda rows, _: rows)
     totals = ["breaks", "energy_residual", "kernel_seconds"]
     if config.contact_kind.force_error_bound > 0:
         totals.append("force_error")
@@ -164,102 +180,74 @@ def _root(results: Results) -> GroupLayout:
     if config.has_avalanches:
         totals += ["avalanche_count", "avalanche_slip"]
     for name in totals:
-        writer.add(name, each, values=[getattr(one, name) for one in realizations])
+        group.add(name, each, values=[getattr(one, name) for one in realizations])
     if config.has_avalanches:
-        writer.add("end_displacement", each, values=[one.displacement for one in realizations])
-    return GroupLayout(sizes, writer.entries, attributes(results))
-
-
-def _catalogue(results: Results, group: Group, table: str) -> _Form:
-    """The start of a group of rows of all realizations."""
-    dimension = DIMENSIONS[table]
-    writer = _Form(group, results.config.contact_kind.is_discrete, {})
-    writer.add("realization_index", (dimension,), table=table, pick=lambda _, owners: owners)
-    return writer
-
-
-# Dimension of the rows of a table in the group of its catalogue.
-DIMENSIONS = {
-    "slips": "slip",
-    "stages": "stage",
-    "slip_trace": "sample",
-    "avalanches": "avalanche",
-    "snapshot_events": "snapshot",
-    "snapshots": "snapshot",
-}
+        group.add("end_displacement", each, values=[one.displacement for one in realizations])
+    return GroupLayout(sizes, group.entries, attributes(results))
 
 
 def _slips(results: Results) -> GroupLayout:
-    writer = _catalogue(results, variables.SLIPS, "slips")
-    picks = {name: column("slips", name) for name in tables.SLIP_COLUMNS}
-    before, after = picks["force_before"], picks["force_after"]
-    picks["force_drop"] = lambda rows, owners: before(rows, owners) - after(rows, owners)
+    group = _GroupBuilder(results, variables.SLIPS, "slips")
+    before, after = column("slips", "force_before"), column("slips", "force_after")
     for name in variables.SLIPS:
-        if name in picks:
-            writer.add(name, ("slip",), table="slips", pick=picks[name])
-    return GroupLayout({"slip": _count(results, "slips")}, writer.entries, {})
+        if name == "force_drop":
+            group.add_column(name, lambda rows, owners: before(rows, owners) - after(rows, owners))
+        elif name in tables.SLIP_COLUMNS:
+            group.add_column(name)
+    return group.catalogue()
 
 
 def _stages(results: Results) -> GroupLayout:
-    writer = _catalogue(results, variables.STAGES, "stages")
+    group = _GroupBuilder(results, variables.STAGES, "stages")
     for name in tables.STAGE_COLUMNS:
-        writer.add(name, ("stage",), table="stages", pick=column("stages", name))
-    return GroupLayout({"stage": _count(results, "stages")}, writer.entries, {})
+        group.add_column(name)
+    return group.catalogue()
 
 
 def _slip_traces(results: Results) -> GroupLayout:
-    writer = _catalogue(results, variables.SLIP_TRACES, "slip_trace")
-    how: dict[str, Any] = {"table": "slip_trace"}
-    writer.add("slip", ("sample",), pick=column("slip_trace", "slip"), **how)
-    writer.add(
-        "sample_time", ("sample",), is_coordinate=True, pick=column("slip_trace", "time"), **how
-    )
+    group = _GroupBuilder(results, variables.SLIP_TRACES, "slip_trace")
+    group.add_column("slip")
+    group.add_column("sample_time", "time", is_coordinate=True)
     for name in recorded(results.config):
-        writer.add(name, ("sample",), pick=column("slip_trace", name), **how)
-    return GroupLayout({"sample": _count(results, "slip_trace")}, writer.entries, {})
+        group.add_column(name)
+    return group.catalogue()
 
 
 def _avalanches(results: Results) -> GroupLayout:
     config, kind = results.config, results.config.contact_kind
-    writer = _catalogue(results, variables.AVALANCHES, "avalanches")
-    picks = {name: column("avalanches", name) for name in tables.AVALANCHE_COLUMNS}
-    picks["start_time"] = picks["time"]
-    names = ["start_time", "displacement", "size", "force_before", "force_drop"]
+    group = _GroupBuilder(results, variables.AVALANCHES, "avalanches")
+    group.add_column("start_time", "time")
+    names = ["displacement", "size", "force_before", "force_drop"]
     if config.slider.jumps:
         names.append("slip")
     if kind.on_lattice:
         names += ["area", "width", "height", "generations"]
     for name in names:
-        writer.add(name, ("avalanche",), table="avalanches", pick=picks[name])
+        group.add_column(name)
     if kind.on_lattice:
         lattice_rows, columns = kind.dimensions(config.contacts).values()
+        width, height = column("avalanches", "width"), column("avalanches", "height")
 
         def spans(rows: Array, owners: Array) -> Array:
-            width, height = picks["width"](rows, owners), picks["height"](rows, owners)
-            reached: Array = (width == columns) | (height == lattice_rows)
+            reached: Array = (width(rows, owners) == columns) | (
+                height(rows, owners) == lattice_rows
+            )
             return reached
 
-        writer.add("spans", ("avalanche",), table="avalanches", pick=spans)
-    return GroupLayout({"avalanche": _count(results, "avalanches")}, writer.entries, {})
+        group.add_column("spans", spans)
+    return group.catalogue()
 
 
 def _snapshots(results: Results) -> GroupLayout:
     """All contacts: dimensions ``snapshot`` and ``contact``; on a lattice ``row``, ``column``."""
     kind, contacts = results.config.contact_kind, results.config.contacts
-    writer = _catalogue(results, variables.SNAPSHOTS, "snapshot_events")
-    how: dict[str, Any] = {"table": "snapshot_events"}
-    writer.add(
-        "snapshot_time",
-        ("snapshot",),
-        is_coordinate=True,
-        pick=column("snapshot_events", "time"),
-        **how,
-    )
-    writer.add("displacement", ("snapshot",), pick=column("snapshot_events", "displacement"), **how)
-    writer.add("avalanche_size", ("snapshot",), pick=column("snapshot_events", "size"), **how)
+    group = _GroupBuilder(results, variables.SNAPSHOTS, "snapshot_events")
+    group.add_column("snapshot_time", "time", is_coordinate=True)
+    group.add_column("displacement")
+    group.add_column("avalanche_size", "size")
     places = kind.dimensions(contacts)
     for name, values in kind.positions(contacts).items():
-        writer.add(name, tuple(places), is_coordinate=True, values=values)
+        group.add(name, tuple(places), is_coordinate=True, values=values)
     stretch, load, generation = (
         tables.SNAPSHOT_NUMBERS.index(name) for name in ("stretch", "load", "generation")
     )
@@ -275,58 +263,44 @@ def _snapshots(results: Results) -> GroupLayout:
         return lambda rows, owners: pick(rows, owners).reshape(-1, *places.values())
 
     for name, pick in picks.items():
-        writer.add(name, ("snapshot", *places), table="snapshots", pick=in_place(pick))
-    sizes = {"snapshot": _count(results, "snapshots"), **places}
-    return GroupLayout(sizes, writer.entries, {})
+        group.add(name, ("snapshot", *places), table="snapshots", pick=in_place(pick))
+    return group.catalogue(**places)
 
 
 def _energy(results: Results) -> GroupLayout:
     """The terms of the energy balance of each realization, from the start of the run [J]."""
     terms = np.array([one.energy for one in results.realizations]).T
-    writer = _Form(variables.ENERGY, results.config.contact_kind.is_discrete, {})
+    group = _GroupBuilder(results, variables.ENERGY)
     for name, values in zip(tables.ENERGY_COLUMNS, terms, strict=True):
         if name == "step_work" and not results.config.contact_kind.step_work_bound > 0:
             continue
         if name in variables.ENERGY:
-            writer.add(name, ("realization",), values=values)
-    return GroupLayout({}, writer.entries, {})
-
-
-def _comment(results: Results, reached: float) -> dict[str, str]:
-    """How far an interrupted run came; CF wants no empty comment of others."""
-    if results.complete:
-        return {}
-    each = "it" if len(results.realizations) == 1 else "every realization"
-    return {"comment": f"interrupted; {each} came to {reached:.6g} s"}
+            group.add(name, ("realization",), values=values)
+    return GroupLayout({}, group.entries, {})
 
 
 def attributes(results: Results) -> dict[str, Any]:
     """Attributes of an output: configuration, program, and state of the run."""
     config, realizations = results.config, results.realizations
-    reached = min(one.time for one in realizations)
-    residual: float = max((one.energy_residual for one in realizations), key=abs)
-    solver = {}
+    attributes = program_attributes(config, "run")
     solver_name = config.slider.solver_name(config)
     if solver_name is not None:
         counts = np.sum([one.integrator_counts for one in realizations], axis=0)
-        solver = {
-            "solver": solver_name,
-            "solver_steps": int(counts[0]),
-            "solver_evaluations": int(counts[1]),
-            "solver_failed_steps": int(counts[2]),
-        }
-    return (
-        program_attributes(config, "run")
-        | solver
-        | {
-            "seed": config.run.seed,
-            "complete": "true" if results.complete else "false",
-            **_comment(results, reached),
-            "break_count": sum(one.breaks for one in realizations),
-            "ending": "; ".join(sorted({one.ending for one in realizations})),
-            "advance_count": sum(one.advances for one in realizations),
-            "energy_residual": residual,
-            "audit": "; ".join(failed_checks(config, realizations)) or "passed",
-            "wall_seconds": results.wall_seconds,
-        }
-    )
+        names = ("solver_steps", "solver_evaluations", "solver_failed_steps")
+        attributes["solver"] = solver_name
+        attributes |= zip(names, counts.tolist(), strict=True)
+    attributes["seed"] = config.run.seed
+    attributes["complete"] = "true" if results.complete else "false"
+    if not results.complete:
+        each = "it" if len(realizations) == 1 else "every realization"
+        reached = min(one.time for one in realizations)
+        attributes["comment"] = f"interrupted; {each} reached {reached:.6g} s"
+    residual: float = max((one.energy_residual for one in realizations), key=abs)
+    return attributes | {
+        "break_count": sum(one.breaks for one in realizations),
+        "ending": "; ".join(sorted({one.ending for one in realizations})),
+        "advance_count": sum(one.advances for one in realizations),
+        "energy_residual": residual,
+        "audit": "; ".join(failed_checks(config, realizations)) or "passed",
+        "wall_seconds": results.wall_seconds,
+    }

@@ -1,4 +1,4 @@
-"""Names in files of earlier versions."""
+"""Names of variables in files of earlier versions."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from mesoslip.output import variables
 if TYPE_CHECKING:
     import xarray as xr
 
-# Names of variables in files of earlier versions, and their present names, by group.
+# Present names by earlier name, by group.
 OLD_NAMES = {
     "slips": {"realization": "realization_index"},
     "slip_traces": {"realization": "realization_index", "time": "sample_time"},
@@ -37,7 +37,7 @@ GROUPS = {
 def present_names(
     group: str, variables: Collection[Any], dimensions: Collection[Any]
 ) -> dict[str, str]:
-    """The present names of variables of a file that had others, by those in the file."""
+    """The present names of variables whose names have changed, by their names in the file."""
     return {
         before: now
         for before, now in OLD_NAMES.get(group, {}).items()
@@ -46,12 +46,12 @@ def present_names(
 
 
 def attributes_of(group: str, name: str) -> dict[str, str]:
-    """Attributes of a variable that had another name, by its present one."""
+    """Attributes of a renamed variable, by its present name."""
     return GROUPS[group][name].attributes
 
 
 def renamed(name: str, data: xr.Dataset) -> xr.Dataset:
-    """A group of a file with the names of today."""
+    """A group of a file with present names of variables."""
     old = present_names(name, data.variables, data.dims)
     if not old:
         return data

@@ -1,4 +1,4 @@
-"""Where an output comes from: attributes after CF and ACDD."""
+"""The origin of an output: attributes after CF and ACDD."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any, Protocol
 
 from mesoslip import _build
 
-# The command as typed, if an output is made on the command line.
+# The command as typed, if an output is made by the command line.
 COMMAND_LINE: ContextVar[str | None] = ContextVar("COMMAND_LINE", default=None)
 
 # Contents of the output of each command.
@@ -39,30 +39,26 @@ SUMMARIES = {
 
 
 class Described(Protocol):
-    """The origin of an output: a configuration, perhaps incomplete."""
+    """The configuration of a run, or the description of a measured trace."""
 
     @property
     def title(self) -> str | None: ...
 
     @property
-    def base(self) -> Described | None:
-        """The configuration it is based on."""
-        ...
+    def base(self) -> Described | None: ...
 
-    def to_toml(self) -> str:
-        """The text of a TOML file."""
-        ...
+    def to_toml(self) -> str: ...
 
 
 @cache
 def version(package: str) -> str:
-    """Version of a package; looked up once, as a sweep asks for it a thousand times."""
+    """Version of a package; cached, as a sweep needs it a thousand times."""
     return metadata.version(package)
 
 
 def program_attributes(config: Described, command: str) -> dict[str, Any]:
     """Attributes of every output: configuration, command and program."""
-    # Imported here, as the command line imports this module and must start at once.
+    # Imported here, as the command line imports this module and must start fast.
     from mesoslip import _core
 
     now = datetime.now(UTC).isoformat(timespec="seconds")

@@ -1,4 +1,4 @@
-"""Samples of a realization, with the finer ones of its slips."""
+"""Samples of a realization: its trace, and finer samples around its slips."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Samples:
     start: int = 0
 
     def inside(self, window: tuple[float, float]) -> tuple[int, int]:
-        """Indices of the first sample of a window of time, and of the first one after it."""
+        """Indices of the first sample in a window of time, and of the first one after it."""
         first = np.searchsorted(self.times, window[0], "left")
         return int(first), int(np.searchsorted(self.times, window[1], "right"))
 
@@ -47,7 +47,7 @@ class Samples:
 
 
 def samples(tree: Tree, realization: int = 0) -> list[Samples]:
-    """Samples of a realization: those of the trace, and the finer ones of its slips."""
+    """Samples of a realization: those of the trace, and the finer ones around slips."""
     root = tree.to_dataset().isel(realization=realization)
     parts = [Samples(root, "time", root["time"].values)]
     if "slip_traces" in tree.children:
@@ -67,7 +67,7 @@ def series(
     realization: int = 0,
     window: tuple[float, float] = (-np.inf, np.inf),
 ) -> tuple[Array, Array]:
-    """Times [s] and values of a variable of a realization, with the finer samples of its slips."""
+    """Times [s] and values of a variable of a realization, with the finer samples around slips."""
     all_times, all_values = [], []
     for part in samples(tree, realization):
         first, after = part.inside(window)

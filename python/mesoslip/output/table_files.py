@@ -1,4 +1,4 @@
-"""Tables as files: comma-separated values in SI, Markdown, and LaTeX with booktabs."""
+"""Files of tables: comma-separated values in SI, Markdown, and LaTeX with booktabs."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from mesoslip.output.targets import written_whole
 # Endings of files of printed tables; all others are comma-separated values.
 MARKDOWN, LATEX = ".md", ".tex"
 
-# Texts of cells, and headers, as LaTeX writes them.
+# Parts of cells and headers in LaTeX.
 LATEX_TEXTS = {
     "µ": r"\textmu{}",
     "±": r"$\pm$",
@@ -32,17 +32,7 @@ LATEX_TEXTS = {
 
 @dataclass(frozen=True)
 class PrintedTable:
-    """A table of texts.
-
-    Attributes
-    ----------
-    title
-        Meaning of a row.
-    head
-        Headers, with units.
-    rows
-        Cells, as many in each row as there are columns.
-    """
+    """A table of texts: its title, headers with units, and rows of cells."""
 
     title: str
     head: tuple[str, ...]
@@ -50,12 +40,12 @@ class PrintedTable:
 
 
 def is_printed(path: Path) -> bool:
-    """Whether a file is of printed tables, Markdown or LaTeX."""
+    """Whether a file is Markdown or LaTeX."""
     return path.suffix.lower() in {MARKDOWN, LATEX}
 
 
 def latex(table: PrintedTable) -> str:
-    """A table as LaTeX, a ``tabular`` with the lines of booktabs."""
+    """A table as LaTeX, a ``tabular`` with the rules of booktabs."""
     rows = [" & ".join(map(_latex, row)) + r" \\" for row in (table.head, *table.rows)]
     lines = [
         r"\begin{tabular}{" + "l" + "r" * (len(table.head) - 1) + "}",
@@ -82,13 +72,7 @@ def markdown(table: PrintedTable) -> str:
 
 
 def write_printed(tables: Sequence[PrintedTable], path: Path) -> None:
-    """Write tables as Markdown or LaTeX, by the ending of the file.
-
-    Raises
-    ------
-    FileError
-        If it cannot be written.
-    """
+    """Write tables as Markdown or LaTeX, by the ending of the file."""
     if path.suffix.lower() == LATEX:
         parts = [r"% \usepackage{booktabs}", *(f"% {one.title}\n{latex(one)}" for one in tables)]
     else:
@@ -98,22 +82,7 @@ def write_printed(tables: Sequence[PrintedTable], path: Path) -> None:
 
 
 def write_table(rows: Iterable[Mapping[str, Any]], units: Mapping[str, str], path: Path) -> None:
-    """Write a table as comma-separated values.
-
-    Parameters
-    ----------
-    rows
-        A dictionary for each row.
-    units
-        Unit of each column, for the header.
-    path
-        The file.
-
-    Raises
-    ------
-    FileError
-        If it cannot be written.
-    """
+    """Write rows as comma-separated values; the header has the unit of each column."""
     with written_whole(path) as part, part.open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, list(units))
         writer.writerow({name: f"{name} [{unit}]" for name, unit in units.items()})

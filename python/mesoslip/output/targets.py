@@ -1,4 +1,4 @@
-"""Files that commands write: whether they can be written, and that they are whole."""
+"""Files that commands write: checks before, and writing as a whole."""
 
 from __future__ import annotations
 
@@ -16,40 +16,26 @@ from mesoslip.configuration.reading import is_directory
 from mesoslip.errors import FileError, WriteError
 from mesoslip.output.file_locks import NO_LOCKS, refused_lock
 
-# How names of files end that are no outputs.
+# Endings of files other than outputs.
 OTHER_KINDS = {".csv", ".txt", ".png", ".pdf", ".svg", ".html", ".json"}
 
-# Bytes that are written to see whether more can be.
+# Bytes that are written to test whether the disk is full.
 PROBE_BYTES = 2**16
 
 
 def check_writable(path: Path, reads: Iterable[str | Path] = ()) -> None:
-    """Make sure, before a run, that its output can be written.
-
-    Parameters
-    ----------
-    path
-        The output.
-    reads
-        Files that the command reads and must not overwrite.
-
-    Raises
-    ------
-    FileError
-        If the path cannot be a file, is one of those, or its folder cannot be created or written
-        to.
-    """
+    """Refuse, before a run, a path that cannot be written, or that the command ``reads``."""
     if path.suffix == ".toml":
-        raise FileError(f"{path}: is the name of a configuration; give another one to the output")
+        raise FileError(f"{path}: is the name of a configuration; give the output another name")
     target = _target(path)
     for one in map(Path, reads):
         if target.exists() and one.exists() and target.samefile(one):
-            raise FileError(f"{path}: is what the command reads; give another name for its output")
+            raise FileError(f"{path}: is read by the command; give its output another name")
     part = _temporary(target)
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         _remove_left_behind(target)
-        # A full disk takes an empty file.
+        # An empty file can be written to a full disk.
         part.write_bytes(bytes(PROBE_BYTES))
     except (OSError, ValueError) as error:
         raise _not_written(path, target, error) from error
@@ -59,29 +45,17 @@ def check_writable(path: Path, reads: Iterable[str | Path] = ()) -> None:
 
 
 def check_output(path: Path, reads: Iterable[str | Path] = ()) -> None:
-    """Make sure that a path is one for an output, and that it can be written; see `check_writable`.
-
-    Raises
-    ------
-    FileError
-        Also if its name ends like that of another kind of file.
-    """
+    """Refuse a path with the ending of another kind of file, or as `check_writable`."""
     if path.suffix.lower() in OTHER_KINDS:
         raise FileError(
             f"{path}: an output is netCDF, and its name must not end in {path.suffix}; "
-            f"{path.with_suffix('.nc')} would be right"
+            f"use {path.with_suffix('.nc')}"
         )
     check_writable(path, reads)
 
 
 def _target(path: Path) -> Path:
-    """The path to write a file to: links are followed; only regular files are accepted.
-
-    Raises
-    ------
-    FileError
-        If there is something else at the path.
-    """
+    """The path at which a file is written: links are followed, and other objects are refused."""
     if is_directory(path):
         raise FileError(f"{path}: cannot be written: is a directory; give the name of a file in it")
     try:
@@ -90,7 +64,7 @@ def _target(path: Path) -> Path:
     except (OSError, RuntimeError, ValueError) as error:
         raise FileError(f"{path}: cannot be written: {error}") from error
     if is_refused:
-        raise FileError(f"{path}: cannot be written: is a device or the like, not a file")
+        raise FileError(f"{path}: cannot be written: is not a regular file")
     return target
 
 
@@ -114,13 +88,13 @@ def _not_written(path: Path, target: Path, error: Exception) -> FileError:
 
 
 def _temporary(path: Path) -> Path:
-    """A name beside a file, with its ending, that no other process or thread has."""
+    """A name beside a file, with its ending, that only this thread uses."""
     owner = f"{platform.node()}-{os.getpid()}-{threading.get_ident()}"
     return path.with_name(f".{owner}.{path.name}")
 
 
 def _remove_left_behind(path: Path) -> None:
-    """Remove parts of a file that processes of this machine left behind, when they were killed."""
+    """Remove parts of a file that killed processes of this machine have left."""
     node = re.escape(platform.node())
     pattern = re.compile(rf"\.{node}-(\d+)-\d+\.{re.escape(path.name)}")
     for other in path.parent.iterdir():
@@ -133,19 +107,13 @@ def _remove_left_behind(path: Path) -> None:
             with suppress(OSError):
                 other.unlink(missing_ok=True)
         except (OSError, OverflowError):
-            # A process of another user, still running, or a number that no process has.
+            # The process of another user is running, or no process can have the number.
             continue
 
 
 @contextmanager
 def written_whole(path: Path) -> Iterator[Path]:
-    """A temporary file that replaces a file when it is complete.
-
-    Raises
-    ------
-    FileError
-        If it cannot be written.
-    """
+    """A temporary file that replaces a file when it is complete."""
     target = _target(path)
     part = _temporary(target)
     try:

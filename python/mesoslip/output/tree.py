@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mesoslip.output.filling import fill
+from mesoslip.output.filling import blocks
 from mesoslip.output.layout import describe
 
 if TYPE_CHECKING:
@@ -19,30 +19,24 @@ Array = NDArray[Any]
 
 
 def build_tree(results: Results) -> xr.DataTree:
-    """The results of a run in memory, with the layout of an output file.
-
-    Returns
-    -------
-    xarray.DataTree
-        Root: the trace, dimensions (realization, time), and numbers for each realization. Groups:
-        ``slips`` (slip), ``slip_traces`` (sample), ``avalanches`` (avalanche), ``snapshots``
-        (snapshot, row, column), ``energy`` (realization). The trace of an
-        interrupted run ends with NaN.
-    """
+    """The results of a run in memory, with the layout of an output file."""
     import xarray as xr
 
     layout = describe(results)
-    sizes = layout[""].sizes
     arrays: dict[str, dict[str, Array]] = {}
     for group, form in layout.items():
-        all_sizes = {**sizes, **form.sizes}
-        arrays[group] = {
-            name: np.full([all_sizes[one] for one in entry.dimensions], np.nan, dtype=entry.dtype)
-            if entry.dtype.kind == "f"
-            else np.zeros([all_sizes[one] for one in entry.dimensions], dtype=entry.dtype)
-            for name, entry in form.entries.items()
-        }
-    fill(results, layout, arrays)
+        sizes = {**layout[""].sizes, **form.sizes}
+        arrays[group] = {}
+        for name, entry in form.entries.items():
+            # Samples after the end of an interrupted run stay NaN.
+            empty = np.nan if entry.dtype.kind == "f" else 0
+            values = np.full([sizes[one] for one in entry.dimensions], empty, dtype=entry.dtype)
+            if not entry.table and np.size(entry.values):
+                values[...] = np.asarray(entry.values, dtype=entry.dtype)
+            arrays[group][name] = values
+    for block in blocks(results, layout):
+        for name, where, values in block.values():
+            arrays[block.group][name][where] = values
     datasets = {}
     for group, form in layout.items():
         made = {

@@ -1,4 +1,4 @@
-"""Whether a file is an output that commands can use."""
+"""Checks that a file is an output that commands can use."""
 
 from __future__ import annotations
 
@@ -11,8 +11,7 @@ from mesoslip.output.access import is_measured
 from mesoslip.output.arrays import Tree
 from mesoslip.output.provenance import version
 
-# Dimensions and variables that commands need of an output of a run: of its root, and of groups that
-# it may have.
+# Dimensions and variables that commands need: of the root of a run, and of groups that it may have.
 ROOT_NEEDS = tuple(variables.TRACE)[:6]
 
 SLIPS = (("slip",), tuple(variables.SLIPS))
@@ -26,26 +25,19 @@ NEEDS = {
 
 
 def check_signature(path: Path) -> None:
-    """Make sure that a file looks like netCDF-4 before a library opens it.
-
-    Raises
-    ------
-    FileError
-        If it does not, or cannot be read.
-    """
+    """Refuse a file that is not netCDF-4, before a library opens it."""
     try:
         if not path.exists():
             raise FileError(f"{path}: no such file")
         if not path.is_file():
-            raise FileError(f"{path}: is a device or the like, not an output file")
+            raise FileError(f"{path}: is not a regular file")
         with path.open("rb") as file:
             start = file.read(8)
     except (OSError, ValueError) as error:
         raise FileError(f"{path}: cannot be read: {error}") from error
     if path.suffix == ".toml":
         raise FileError(
-            f"{path}: is a configuration, not an output (netCDF); make one of it first: "
-            f"mesoslip run {path}"
+            f"{path}: is a configuration, not an output (netCDF); run it first: mesoslip run {path}"
         )
     if start != b"\x89HDF\r\n\x1a\n":
         hint = f"; mesoslip trace {path} makes an output of a table" if _is_table(path) else ""
@@ -57,13 +49,7 @@ def _is_table(path: Path) -> bool:
 
 
 def check_layout(tree: Tree, path: Path) -> None:
-    """Check that an output has the variables that commands use, as numbers with their dimensions.
-
-    Raises
-    ------
-    FileError
-        If it is not.
-    """
+    """Refuse an output without the variables that commands use, with their dimensions."""
     if "configuration" not in tree.attrs:
         raise FileError(f"{path}: not an output of mesoslip")
     wrong = [
@@ -74,7 +60,7 @@ def check_layout(tree: Tree, path: Path) -> None:
     if variables.has_force(tree.data_vars):
         root, slips = ROOT_NEEDS, {"slips": SLIPS}
         if is_measured(tree):
-            # A quantity that was not measured is absent.
+            # Quantities that were not measured are absent.
             known = (*variables.TRACE, *variables.MEASURED)
             root = tuple(name for name in known if name in tree.data_vars)
             slips = {name: one for name, one in slips.items() if name in tree.children}
@@ -98,13 +84,13 @@ def check_layout(tree: Tree, path: Path) -> None:
             wrong.append("coordinates realization and time")
     newer = _newer_version(tree.attrs.get("program_version"))
     if wrong and newer:
-        raise FileError(f"{path}: is of {newer}, and cannot be read: {wrong[0]} is not as it was")
+        raise FileError(f"{path}: is of {newer}, and cannot be read: {wrong[0]} is different")
     if wrong:
         raise FileError(f"{path}: a damaged netCDF-4 file: {wrong[0]} is missing or wrong")
 
 
 def _newer_version(written: object) -> str:
-    """The program that has written a file, if it is newer than this one; otherwise empty."""
+    """The program that wrote a file if it is newer than this one; otherwise empty."""
     ours = version("mesoslip")
     theirs, here = ([int(one) for one in re.findall(r"\d+", str(text))] for text in (written, ours))
     if written is None or theirs <= here:

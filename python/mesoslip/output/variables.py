@@ -15,20 +15,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Meaning:
-    """Unit, long name and type of a variable.
+    """Unit and long name (as in CF), type, and further attributes of a variable.
 
-    Parameters
-    ----------
-    units, long_name
-        As CF has them.
-    dtype
-        Type of its values.
-    is_fractional
-        Whether it is a real number in the master equation, which has fractions of contacts.
-    is_regular
-        Whether its values lie at nearly equal distances, and shrink much by compression.
-    further
-        Further attributes.
+    A fractional one is an integer of contacts one by one, and a real number in the master equation.
+    A regular one has nearly equidistant values, which compress well.
     """
 
     units: str
@@ -44,8 +34,17 @@ class Meaning:
         return {"units": self.units, "long_name": self.long_name, **self.further}
 
 
+def _flags(long_name: str, meanings: str) -> Meaning:
+    """A variable of small integers with words as their meanings, as in CF."""
+    return Meaning("1", long_name, np.int8, further={"flag_meanings": meanings})
+
+
 class Group(dict[str, Meaning]):
     """The variables that a group of an output may have."""
+
+    def subset(self, *names: str) -> Group:
+        """Some of the variables, in this order."""
+        return Group({name: self[name] for name in names})
 
     def variable(self, name: str, dimensions: Sequence[str], values: Any) -> xr.Variable:
         """A variable of the group with its units and long name."""
@@ -73,8 +72,8 @@ TRACE = Group(
     base_displacement=Meaning("m", "displacement of the base"),
 )
 
-# Variables of a measured trace that a run does not have. Its force is the spring force, or the
-# friction coefficient where no normal force is known.
+# Variables of measured traces only. The force of a measured trace is the spring force, or the
+# friction coefficient if the normal force is not known.
 MEASURED = Group(
     friction_coefficient=Meaning("1", "friction coefficient"),
     normal_force=Meaning("N", "normal force"),
@@ -128,13 +127,12 @@ SLIPS = Group(
     ),
 )
 
-# Of a measured trace.
 MEASURED_SLIPS = Group(
     SLIPS,
     peak_fall_rate=Meaning("N s-1", "maximum rate at which the spring force fell in the slip"),
 )
 
-# Noise of a measured trace; forces are coefficients where the trace is one.
+# Noise of a measured trace; forces are friction coefficients if the trace has only these.
 NOISE = Group(
     deviation=Meaning("N", "standard deviation of the white noise"),
     correlated_deviation=Meaning("N", "standard deviation of correlated noise, 0 for none"),
@@ -174,19 +172,12 @@ STAGES = Group(
     mean_force=Meaning("N", "mean of the spring force over the time of the stage"),
 )
 
-# Stages that were found in a measured load point.
+# Stages found in a measured load point.
 MEASURED_STAGES = Group(
-    **{
-        name: STAGES[name]
-        for name in (
-            "realization_index",
-            "stage_number",
-            "stage_start_time",
-            "stage_end_time",
-            "drive_start_velocity",
-            "drive_end_velocity",
-        )
-    },
+    STAGES.subset(
+        *("realization_index", "stage_number", "stage_start_time", "stage_end_time"),
+        *("drive_start_velocity", "drive_end_velocity"),
+    ),
     drive_velocity_error=Meaning("m s-1", "standard error of the mean velocity of the stage"),
 )
 
@@ -310,6 +301,8 @@ CYCLE = Group(
     multiplier_imaginary=Meaning("1", "imaginary part of the multipliers of the cycle"),
 )
 
+MOTIONS = "smooth periodic irregular"
+
 BRANCHES = Group(
     amplitude=Meaning("N", "maximum less minimum of the spring force in the settled motion"),
     amplitude_ratio=Meaning("1", "amplitude over the static force"),
@@ -318,27 +311,15 @@ BRANCHES = Group(
     peak_force=Meaning("N", "maximum of the spring force"),
     low_force=Meaning("N", "minimum of the spring force"),
     multiplier=Meaning("1", "modulus of the leading multiplier of the cycle"),
-    motion=Meaning(
-        "1",
-        "settled motion",
-        np.int8,
-        further={"flag_meanings": "smooth periodic irregular"},
-    ),
+    motion=_flags("settled motion", MOTIONS),
     multiple=Meaning("1", "passages of the section in a cycle", np.int8),
     steady_force=Meaning("N", "force of steady sliding"),
     growth_rate=Meaning("s-1", "growth rate of small perturbations of steady sliding"),
     end_value=Meaning("1", "last value with an oscillation that ends in smooth sliding"),
     end_beyond=Meaning("1", "first value without it"),
     end_amplitude_ratio=Meaning("1", "amplitude at the last value over the static force"),
-    end_direction=Meaning(
-        "1", "direction of the values", np.int8, further={"flag_meanings": "up down"}
-    ),
-    end_motion=Meaning(
-        "1",
-        "motion at the last value",
-        np.int8,
-        further={"flag_meanings": "smooth periodic irregular"},
-    ),
+    end_direction=_flags("direction of the values", "up down"),
+    end_motion=_flags("motion at the last value", MOTIONS),
 )
 
 STEADY = Group(
@@ -352,10 +333,8 @@ STEADY = Group(
 
 CYCLE_TRACE = Group(
     time=Meaning("s", "time since the first passage of the section"),
-    spring_force=Meaning("N", "force of the spring of the drive"),
-    contact_force=Meaning("N", "force of the slider on the contacts"),
-    velocity=Meaning("m s-1", "velocity of the slider"),
-    drive_displacement=Meaning("m", "displacement of the drive"),
-    displacement=Meaning("m", "displacement of the slider"),
-    detached_contacts=Meaning("1", "number of detached contacts"),
+    **TRACE.subset(
+        *("spring_force", "contact_force", "velocity", "drive_displacement", "displacement"),
+        "detached_contacts",
+    ),
 )

@@ -1,4 +1,4 @@
-"""Outputs written to files: netCDF-4 with the layout that `mesoslip.run` returns in memory."""
+"""Files of outputs: netCDF-4 with the layout that `mesoslip.run` returns in memory."""
 
 from __future__ import annotations
 
@@ -22,61 +22,37 @@ if TYPE_CHECKING:
 
     from mesoslip.simulation.run_realizations import Results
 
-# Variables with fewer values are not worth compressing.
+# Number of values from which a variable is compressed.
 MIN_COMPRESSED = 1000
 
 COMPRESSION: dict[str, Any] = {"zlib": True, "complevel": COMPRESSION_LEVEL, "shuffle": True}
 
 
 def write(tree: xr.DataTree, path: Path) -> None:
-    """Write a tree as an output; its name appears only when it is whole.
-
-    Raises
-    ------
-    FileError
-        If it cannot be written.
-    """
+    """Write a tree as an output; its name appears only when it is whole."""
     encoding = {group.path: _encoding(group.to_dataset(inherit=False)) for group in tree.subtree}
-    # xarray asks Dask for the locks of its scheduler, of which there is none unless it is imported.
+    # xarray would import Dask to look for locks of its scheduler.
     with written_whole(path) as part, LOCK, array_packages.hidden():
         tree.to_netcdf(part, engine="netcdf4", encoding=encoding)
 
 
 def _encoding(data: xr.Dataset) -> dict[str, dict[str, Any]]:
-    """Compression of large variables, and missing values of what is no coordinate, as in CF."""
+    """Compression of large variables, and missing values; CF has none for coordinates."""
     encoding: dict[str, dict[str, Any]] = {}
     for name, one in data.variables.items():
         is_large = one.size > MIN_COMPRESSED and one.encoding.get("zlib", True)
         if name in data.coords:
             encoding[str(name)] = {**(COMPRESSION if is_large else {}), "_FillValue": None}
         elif is_large:
-            encoding[str(name)] = {**COMPRESSION, **_fill_value(one)}
+            known = {key: value for key, value in one.encoding.items() if key == "_FillValue"}
+            encoding[str(name)] = {**COMPRESSION, **known}
     return encoding
 
 
-def _fill_value(variable: xr.Variable) -> dict[str, Any]:
-    """Encoding of missing values, where it is known."""
-    return {key: variable.encoding[key] for key in ("_FillValue",) if key in variable.encoding}
-
-
 def write_results(results: Results, path: Path, *, threads: int = 1) -> None:
-    """Write the results of a run, of which only blocks are held in memory.
+    """Write the results of a run block by block, compressed on threads.
 
-    The file is that of `write` and `mesoslip.output.tree.build_tree`.
-
-    Parameters
-    ----------
-    results
-        The results.
-    path
-        The file.
-    threads
-        Threads that arrange and compress values.
-
-    Raises
-    ------
-    FileError
-        If it cannot be written.
+    The file equals that of `write` for the tree of `mesoslip.output.tree.build_tree`.
     """
     groups = layout.describe(results)
     with written_whole(path) as part, LOCK:
@@ -90,7 +66,7 @@ def write_results(results: Results, path: Path, *, threads: int = 1) -> None:
 def _create_group(
     place: netCDF4.Dataset, form: GroupLayout, root: GroupLayout, config: Config
 ) -> None:
-    """Make the dimensions, variables and attributes of a group, and write what is no table."""
+    """Make the dimensions, variables and attributes of a group, and write all but tables."""
     place.setncatts(form.attributes)
     for name, size in form.sizes.items():
         place.createDimension(name, size)
@@ -110,10 +86,9 @@ def _create_group(
 
 
 def _storage(entry: Entry, shape: list[int], config: Config) -> dict[str, Any]:
-    """Chunks of a variable that hold a block of rows, and compression where it pays."""
+    """Chunks of a variable, each a block of rows of one realization, and compression."""
     if math.prod(shape) <= MIN_COMPRESSED or not entry.table:
         return {}
-    # One realization at a time.
     chunks = [1, *shape[1:]] if entry.is_padded else list(shape)
     along = 1 if entry.is_padded else 0
     chunks[along] = min(shape[along], filling.block_rows(config, entry.table))

@@ -1,4 +1,4 @@
-"""Outputs as Zarr, by xarray: the layout of the netCDF file, for storage in pieces."""
+"""Outputs as Zarr stores, by xarray, with the layout of netCDF files."""
 
 from __future__ import annotations
 
@@ -13,26 +13,16 @@ from mesoslip.errors import FileError
 if TYPE_CHECKING:
     import xarray as xr
 
-# Version of the format: 3 has no text of fixed length.
+# Version of the format; version 3 has no text of fixed length.
 FORMAT = 2
-# File of a group, by which an earlier store is known.
+# File of a group, by which a store is recognized.
 MARK = ".zgroup"
 
 
 def write_zarr(tree: xr.DataTree, path: Path) -> None:
     """Write an output as a Zarr store, a folder that appears when it is whole.
 
-    Parameters
-    ----------
-    tree
-        The output, in memory. ``xarray.open_datatree(path, engine="zarr")`` reads it again.
-    path
-        The folder; an earlier store there is replaced.
-
-    Raises
-    ------
-    FileError
-        If zarr is not installed, something else is at the path, or the store cannot be written.
+    It replaces an earlier store. ``xarray.open_datatree(path, engine="zarr")`` reads it.
     """
     try:
         import zarr  # noqa: F401
@@ -42,7 +32,7 @@ def write_zarr(tree: xr.DataTree, path: Path) -> None:
             "'mesoslip[zarr]', or python -m pip install zarr"
         ) from None
     if path.exists() and not (path / MARK).is_file():
-        raise FileError(f"{path}: cannot be written: is there, and is no Zarr store")
+        raise FileError(f"{path}: cannot be written: exists, and is not a Zarr store")
     plain = tree.copy()
     for group in plain.subtree:
         for name in group.variables:

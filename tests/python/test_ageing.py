@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 
 import mesoslip
@@ -38,6 +39,14 @@ def staged(factor: float = 1.0) -> dict[str, object]:
 PRESCRIBED = {"slider": {"kind": "prescribed"}, "contacts__coupling": "equal"}
 
 
+def run_of(kind, **changes):
+    config = configuration(kind, contacts__coupling="equal", **changes)
+    return build_tree(run_realizations(config, executor=1))
+
+
+without_ageing = functools.lru_cache(1)(run_of)
+
+
 @pytest.mark.parametrize(
     "kind",
     [
@@ -54,12 +63,7 @@ def test_young_like_old_is_without_ageing_to_the_bit(kind, law):
     same = {"law": "relax", "time": 1e-3, "young_force_ratio": 1.0, "young_relative_width": 0.1}
     if law == "log":
         same = {"law": "log", "time": 1e-3, "growth": 0.0}
-    one, other = (
-        build_tree(
-            run_realizations(configuration(kind, contacts__coupling="equal", **ageing), executor=1)
-        )
-        for ageing in ({}, {"contacts__ageing": same})
-    )
+    one, other = without_ageing(kind), run_of(kind, contacts__ageing=same)
     assert one["breaks"].values.min() >= 48
     names = ("displacement", "velocity", "spring_force", "contact_force", "breaks")
     if kind == "prescribed, thermal":
@@ -98,7 +102,7 @@ def test_limits_of_fast_and_slow_ageing(klein, engine, limit):
     assert np.max(difference) < bound * STATIC
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", [long("relax"), "weaken", "log"])
 def test_prescribed_with_reversals_converges_to_events(klein, law):
     config = klein(
         **PRESCRIBED | staged(),
@@ -121,7 +125,7 @@ def test_prescribed_with_reversals_converges_to_events(klein, law):
     assert errors[0] / errors[1] > 2.5
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", ["relax", "weaken", long("log")])
 def test_rigid_with_reversals_converges_to_events(klein, law):
     config = klein(
         **staged(10.0),
@@ -291,7 +295,7 @@ VELOCITIES = [1e-8, 1e-7, 1e-6, 1e-5, 1e-4]
 
 
 @pytest.mark.parametrize(("law", "width"), [("gaussian", 0.1), ("uniform", 0.2), ("weibull", 0.15)])
-@pytest.mark.parametrize("velocity", VELOCITIES)
+@pytest.mark.parametrize("velocity", [1e-8, long(1e-7), 1e-6, long(1e-5), 1e-4])
 def test_steady_force_of_many_contacts(klein, law, width, velocity):
     """Block averages of N contacts against the integral over first passages."""
     period = STRETCH / velocity
@@ -309,11 +313,11 @@ def test_steady_force_of_many_contacts(klein, law, width, velocity):
 
 @pytest.mark.parametrize(
     ("law", "width", "resolution", "bound"),
-    [("gaussian", 0.1, 0.05, 1e-6), ("uniform", 0.2, 0.1, 3e-5), ("weibull", 0.15, 0.1, 1e-5)],
+    [("gaussian", 0.1, 0.1, 4e-6), ("uniform", 0.2, 0.1, 3e-5), ("weibull", 0.15, 0.1, 1e-5)],
 )
 @pytest.mark.parametrize("velocity", [1e-8, long(1e-7), 1e-6, long(1e-5), 1e-4])
 def test_steady_force_of_the_master_equation(klein, law, width, resolution, bound, velocity):
-    """To six digits; the error falls with the square of the resolution."""
+    """To five digits; the error falls with the square of the resolution."""
     period = STRETCH / velocity
     config = klein(
         **steady(law, width, velocity, run__engine="me", run__resolution=resolution),
@@ -364,7 +368,7 @@ def test_many_contacts_come_to_the_master_equation(klein, slider):
     else:
         # A spring stiff enough for sliding to be smooth: slips come at random times.
         changes |= {"slider__stiffness": 5000.0}
-    infinite = mesoslip.run(klein(**changes, run__engine="me", run__resolution=0.1))
+    infinite = mesoslip.run(klein(**changes, run__engine="me"))
     counts = np.array([100, 400, 1600])
     errors = []
     for count in counts:
@@ -413,7 +417,7 @@ def test_restart_peak_is_that_of_its_formula(klein, growth, width):
     config = klein(
         **PRESCRIBED,
         run__engine="me",
-        run__resolution=0.1,
+        run__resolution=0.2,
         run__duration=None,
         drive={"stage": stages},
         output__interval=1e-2,

@@ -56,20 +56,9 @@ def critical_spring(
 ) -> tuple[float, float] | None:
     """Largest stiffness of the spring at which a perturbation neither grows nor decays.
 
-    Parameters
-    ----------
-    slider
-        The slider, whose own spring does not matter.
-    response
-        Λ(iω) at frequencies [N/m].
-    path
-        Frequencies between which a root is sought [1/s], positive and ascending.
-
-    Returns
-    -------
-    tuple of float, or None
-        The static stiffness [N/m] and the angular frequency of the perturbation [1/s]; None also
-        for a slider of which no critical spring is known.
+    It is the static stiffness [N/m], with the angular frequency of the perturbation [1/s]; None
+    also for a slider of which no critical spring is known. The slider's own spring does not matter.
+    ``response`` gives Λ(iω) [N/m]; a root is sought between ascending positive frequencies ``path``.
     """
     stiffness, excess = balancing_spring(slider, path, response(path))
     added = _near_minima(path, excess)
@@ -138,7 +127,7 @@ def balancing_spring(
     response: Complex,  # noqa: ARG001
 ) -> tuple[Array, Array]:
     """Stiffness with which the real part of the characteristic function is zero, and its imaginary
-    part then [N/m]; the largest one if there are several, NaN if there is none."""
+    part then [N/m]; the largest one if there are several, NaN without one."""
     unknown = np.full_like(frequency, math.nan)
     return unknown, unknown
 

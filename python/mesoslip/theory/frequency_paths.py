@@ -74,23 +74,9 @@ class Turns(NamedTuple):
 def counting_path(
     slider: SliderTable, response: Callable[[Complex], Parts], scale: float, turns: Turns
 ) -> Array:
-    """The path along which the roots of a slider are counted.
+    """Frequencies along which the roots of a slider are counted [1/s], ascending from 0.
 
-    Parameters
-    ----------
-    slider
-        The slider, with a motion of its own.
-    response
-        Λ at rates [1/s], in parts.
-    scale
-        A frequency of the slider [1/s].
-    turns
-        The times with which the response turns.
-
-    Returns
-    -------
-    numpy.ndarray
-        Frequencies [1/s], ascending from 0.
+    ``response`` gives Λ at rates [1/s], ``scale`` is a frequency of the slider [1/s].
     """
     # Beyond the last frequency the slider outweighs any response of the contacts.
     coarse = scale * np.geomspace(1e-2, 1e6, 1500)
@@ -124,20 +110,10 @@ def search_path(
     turns: Turns,
     path: Array,
 ) -> Array | None:
-    """Frequencies between which critical ones are sought, of any spring of a slider.
+    """Ascending frequencies between which critical ones of any spring are sought [1/s].
 
-    Parameters
-    ----------
-    slider, response, scale, turns
-        As for `counting_path`.
-    path
-        The path along which roots are counted with the slider's own spring, without 0 [1/s].
-
-    Returns
-    -------
-    numpy.ndarray or None
-        Ascending [1/s]; None if contacts feed a slider with stiff springs too fast for a path to
-        resolve it.
+    ``path`` is the one along which roots are counted with the slider's own spring, without 0. None
+    if contacts feed a slider with stiff springs too fast for a path to resolve it.
     """
     frequency = scale * np.geomspace(1e-2, 1e6, SEARCH_POINTS)
     parts = response(1j * frequency)

@@ -29,7 +29,7 @@ PANELS, POINTS = 100, 10
 # Probability beyond either end of the quadrature over a threshold law.
 LEFT_OUT = 1e-16
 # Where newborn contacts bear different forces thresholds are summed between normal deviates of this
-# size, in panels of some width of forces over that of thresholds, of which there are so many.
+# size, in panels of a width of forces over that of thresholds, between two numbers of them.
 DEVIATES, PANEL_WIDTH, SUMMED_PANELS = 8.2, 1.0, (20, 400)
 # Arguments beyond which integrals of a panel come from a recurrence, and points of the rule that
 # they come from otherwise, which is exact to rounding there.
@@ -70,12 +70,7 @@ class Transforms(NamedTuple):
 class LifeTransforms:
     """Averages over the lives of the contacts of a configuration, without ageing and temperature.
 
-    Parameters
-    ----------
-    config
-        The configuration.
-    relative_width
-        Relative width of the threshold law.
+    The relative width of thresholds may differ from that of the configuration.
     """
 
     def __init__(self, config: Config, relative_width: float) -> None:

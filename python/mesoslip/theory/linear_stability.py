@@ -205,11 +205,6 @@ class LinearStability(abc.ABC):
 
         Z + Λ has no poles there. It grows as a power of λ, whose degree gives the change of its
         argument around the half-plane; the change along the line itself is computed.
-
-        Raises
-        ------
-        RunError
-            If that leaves the range of floating-point numbers.
         """
         slider = dynamic_stiffness(self.config.slider, np.array([1j * self._scale]))
         assert slider is not None
@@ -245,13 +240,7 @@ class LinearStability(abc.ABC):
 
     @cached_property
     def unstable_count(self) -> int:
-        """Number of roots that grow, each of a pair counted.
-
-        Raises
-        ------
-        RunError
-            If that leaves the range of floating-point numbers.
-        """
+        """Number of roots that grow, each of a pair counted; a RunError on overflow."""
         if not self._has_motion or self.is_passive:
             return 0
         return self._right_of(NO_GROWTH * self._scale)

@@ -39,16 +39,9 @@ class RenewalSolution:
 def solve_renewal(
     parameters: Parameters, start: float, width: float, panels: int
 ) -> RenewalSolution:
-    """Solve the renewal equation of a threshold law.
+    """Solve the renewal equation of a law, given by `mesoslip.theory.lives.law_parameters`.
 
-    Parameters
-    ----------
-    parameters
-        The law and how contacts start, from `mesoslip.theory.lives.law_parameters`.
-    start, width
-        Start of the first panel and width of each, over the mean breaking stretch.
-    panels
-        Number of panels.
+    ``start`` of the first panel and ``width`` of each are relative to the mean breaking stretch.
     """
     point, breaks, slope, force, stiffness, pinned, mismatch = checked(
         _core.force_curve(*named(parameters), start, width, panels, POINTS)

@@ -91,25 +91,11 @@ def solve(
     end_displacement: float = math.inf,
     interval: float | None = None,
 ) -> Onset:
-    """Integrate S46 ("sequential") or S47 ("melting").
+    """Integrate S46 ("sequential") or S47 ("melting") with the coefficients D0 to D3.
 
-    Parameters
-    ----------
-    equation
-        The equation.
-    coefficients
-        D0 to D3; S46 does not need the first, S47 the last two.
-    damping, drag
-        η_S/Ω_S, and η/Ω_S of the molten film per slider mass.
-    end_displacement
-        x at which S46 ends.
-    interval
-        Interval of the samples in τ; by default a small fraction of the equation's time scale.
-
-    Raises
-    ------
-    RunError
-        If the integration fails.
+    ``damping`` is η_S/Ω_S, ``drag`` the η/Ω_S of the molten film per slider mass; S46 ends at the x
+    of ``end_displacement``; ``interval`` of the samples in τ is by default a small fraction of the
+    equation's time scale. A RunError is raised if the integration fails.
     """
     _, d_1, d_2, _ = coefficients
     if interval is None:

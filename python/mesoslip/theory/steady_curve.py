@@ -33,18 +33,7 @@ TOLERANCE = 0.01
 
 
 class SteadyCurve:
-    """Steady sliding at velocities around that of the drive.
-
-    Parameters
-    ----------
-    config
-        A configuration of contacts that age or break by thermal activation.
-
-    Raises
-    ------
-    ConfigError
-        If there is no theory for the contacts or the slider, or no velocity.
-    """
+    """Steady sliding at velocities around that of the drive; a ConfigError without a theory."""
 
     def __init__(self, config: Config) -> None:
         self.config = config

@@ -33,27 +33,10 @@ def stretch_density(
     newborn_width: float,
     mean_life: float,
 ) -> tuple[Array, float]:
-    """Q(x; X), and the fraction of contacts that are all at x = X.
+    """Q(x; X) at stretches x, shape (points), and the fraction of contacts that are all at x = X.
 
-    Parameters
-    ----------
-    config
-        The contacts.
-    breaks
-        Γ: breaks of a contact over displacement at displacements; NaN outside the curve.
-    stretch
-        Stretches x, shape (points).
-    displacement
-        X.
-    newborn_width
-        Standard deviation of the stretch at attaching.
-    mean_life
-        Mean displacement from attaching to breaking.
-
-    Returns
-    -------
-    density, fraction
-        Their integral and sum is 1.
+    The integral and the fraction add up to 1. ``breaks`` is Γ over displacement, NaN outside the
+    curve; ``mean_life`` the mean displacement from attaching to breaking.
     """
     return _Density(config, breaks, newborn_width, mean_life).at(stretch, displacement)
 

@@ -77,18 +77,9 @@ class TableLives(NamedTuple):
     def newborn_density(
         self, stretch: Array, moved: float, shift: float, breaks: Callable[[Array], Array]
     ) -> Array:
-        """Density of stretches of contacts that attached since the start.
+        """Density of stretches of contacts that attached within ``moved`` of the start.
 
-        Parameters
-        ----------
-        stretch
-            The stretches.
-        moved
-            Displacement since the start.
-        shift
-            Stretch at which contacts attach beyond f_b/k.
-        breaks
-            Breaks of a contact over displacement, as a function of the displacement.
+        ``shift`` is their stretch at attaching beyond f_b/k; ``breaks`` is Γ over displacement.
         """
 
         def density(x: Array) -> Array:
@@ -153,16 +144,9 @@ def sums_of_panels(
 ) -> Array:
     """Coefficients of Legendre polynomials (panels, points, averages) from parts of cells.
 
-    Parameters
-    ----------
-    edges
-        Edges of the panels, evenly spaced.
-    panel
-        Number of the panel of each part, shape (parts).
-    lives, share
-        Points in each part and their probabilities, shape (parts, points).
-    averaged
-        Values at the points, shape (parts, points, averages).
+    ``panel`` is the number of the panel of each part, shape (parts), between even ``edges``;
+    ``lives`` and ``share`` are points and probabilities, shape (parts, points), with the values
+    ``averaged``, shape (parts, points, averages).
     """
     points = lives.shape[1]
     place = 2 * (lives - edges[panel][:, None]) / (edges[1] - edges[0]) - 1

@@ -19,17 +19,7 @@ MAX_DEVIATE = 8.0
 def threshold_quadrature(config: Config, panels: int, points: int) -> tuple[Array, Array]:
     """Weights and points of a quadrature over the configured thresholds, relative to the mean.
 
-    Parameters
-    ----------
-    config
-        The configuration.
-    panels, points
-        Number of panels, and of points in each.
-
-    Returns
-    -------
-    weight, threshold : ndarray
-        Shape (panels × points) each; the weights add up to 1.
+    Both have the shape (panels × points); the weights add up to 1.
     """
     # scipy takes long to import.
     from scipy import special

@@ -23,30 +23,13 @@ STEPS, TOLERANCE = 200, 1e-12
 
 
 def rate_and_state_of_narrow_thresholds(config: Config, velocity: float) -> RateAndStateTheory:
-    """a, b and D_c of contacts of one threshold f(t), for f_T ≪ f_s and without delay.
+    """a, b and D_c at a velocity [m/s] of contacts of one threshold f(t), without delay.
 
-    They break in the mean at the stretch x = f(T) - f_T [E₁(z) + ln z + γ], of the age
-    T = (x - x_b)/v, with z = ω_0 f_T/(k v c) and c = 1 - f'(T)/(k v). With the share
+    For f_T ≪ f_s they break in the mean at the stretch x = f(T) - f_T [E₁(z) + ln z + γ], of the
+    age T = (x - x_b)/v, with z = ω_0 f_T/(k v c) and c = 1 - f'(T)/(k v). With the share
     σ = 1 - e^(-z) that breaks below its threshold, and the growth g = T f'(T) of thresholds,
 
         a = N f_T σ/c²,   a - b = N (f_T σ - g)/(2c),   D_c = (x - x_b) (f_T σ/6 + g/3)/(f_T σ + g).
-
-    Parameters
-    ----------
-    config
-        A configuration with ``contacts.thermal``, with or without ageing.
-    velocity
-        Positive [m/s].
-
-    Returns
-    -------
-    RateAndStateTheory
-        The parameters.
-
-    Raises
-    ------
-    MesoslipError
-        If contacts attach with a delay.
     """
     from scipy.special import exp1
 

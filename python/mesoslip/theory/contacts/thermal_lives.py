@@ -54,37 +54,14 @@ MAX_EXPONENT = 700.0
 class ThermalLives:
     """Quadratures over thresholds and ages; forces over f_s, stretches over f_s/k, times in s.
 
-    Parameters
-    ----------
-    config
-        A configuration with ``contacts.thermal``.
-    velocity
-        Positive [m/s].
-    max_panel
-        Maximum length of a panel over ages at which contacts break [s].
-    coarseness
-        Length of the panels over ages; 1 for about ten digits.
-    threshold_panel
-        Length of the panels over thresholds, over f_T; as `coarseness` by default.
-    max_threshold_panels
-        Their maximum number.
+    ``coarseness`` is the length of the panels over ages, 1 for about ten digits, and
+    ``max_panel`` their maximum length [s]; ``threshold_panel`` the length of those over thresholds,
+    over f_T, by default as `coarseness`. Contacts that do not attach again, or attach with different
+    forces, are refused.
 
-    Raises
-    ------
-    ConfigError
-        If contacts do not attach again, or attach with different forces
-        (``contacts.newborn_width``).
-
-    Attributes
-    ----------
-    weight
-        Weights of the thresholds, shape (thresholds, 1).
-    threshold
-        Configured thresholds, shape (thresholds, 1).
-    age, step
-        Points of the ages and their weights, shape (thresholds, points).
-    stretch, rate, hazard
-        x, h [1/s] and ∫ h dt there.
+    Weights and configured thresholds have the shape (thresholds, 1); ages with their weights,
+    ``age`` and ``step``, and x, h [1/s] and ∫ h dt there, ``stretch``, ``rate`` and ``hazard``,
+    (thresholds, points).
     """
 
     def __init__(
@@ -112,7 +89,7 @@ class ThermalLives:
         )
         self.weight, self.threshold = weight[:, None], threshold[:, None]
         self.end = self._end()
-        """Ages at which contacts come to their thresholds, shape (thresholds, 1)."""
+        """Ages at which contacts reach their thresholds, shape (thresholds, 1)."""
         edges = self._edges(max_panel, coarseness)
         self.edges = edges
         self.point, panel_weight = np.polynomial.legendre.leggauss(POINTS)
@@ -150,7 +127,7 @@ class ThermalLives:
 
     @cached_property
     def reached(self) -> Array:
-        """Probability of coming to the threshold, shape (thresholds, 1)."""
+        """Probability of reaching the threshold, shape (thresholds, 1)."""
         return np.where(
             self.edges[:, -1:] >= self.end * (1 - 1e-12), np.exp(-self.last_hazard[:, None]), 0.0
         )

@@ -59,15 +59,7 @@ class _Panel(NamedTuple):
 
 
 class ThermalResponse:
-    """Averages over thresholds and ages, with panels of a length.
-
-    Parameters
-    ----------
-    lives
-        Lives of the contacts.
-    length
-        Length of the panels over the ages at which contacts break [s].
-    """
+    """Averages over thresholds and ages, with panels of a length [s] where contacts break."""
 
     def __init__(self, lives: ThermalLives, length: float) -> None:
         self.lives = lives
@@ -128,7 +120,7 @@ class ThermalResponse:
         return self.lives.rate_at(age[None, :], self.lives.back + self.lives.speed * age[None, :])
 
     def _cut(self, start: float, end: float, rows: NDArray[np.intp], hazard: Array) -> Array:
-        """S of contacts that come to their thresholds within a panel, shape (thresholds, points).
+        """S of contacts that reach their thresholds within a panel, shape (thresholds, points).
 
         Weights at the points of the panel, with which polynomials are integrated to these ages.
         """
@@ -190,7 +182,7 @@ class ThermalResponse:
         return early, loaded
 
     def _ends(self, rate: Complex) -> tuple[Complex, Complex]:
-        """Contacts that come to their thresholds early, and the force that they bore."""
+        """Contacts that reach their thresholds early, and the force that they bore."""
         lives = self.lives
         some = lives.reached[:, 0] > 0
         end = lives.end[some, 0]

@@ -58,7 +58,7 @@ def critical_spring(
 
     It is the static stiffness [N/m], with the angular frequency of the perturbation [1/s]; None
     also for a slider of which no critical spring is known. The slider's own spring does not matter.
-    ``response`` gives Λ(iω) [N/m]; a root is sought between ascending positive frequencies ``path``.
+    ``response`` gives Λ(iω) [N/m]; roots are sought between ascending frequencies ``path`` > 0.
     """
     stiffness, excess = balancing_spring(slider, path, response(path))
     added = _near_minima(path, excess)

@@ -56,8 +56,8 @@ class ThermalLives:
 
     ``coarseness`` is the length of the panels over ages, 1 for about ten digits, and
     ``max_panel`` their maximum length [s]; ``threshold_panel`` the length of those over thresholds,
-    over f_T, by default as `coarseness`. Contacts that do not attach again, or attach with different
-    forces, are refused.
+    over f_T, by default as `coarseness`. Contacts that do not attach again, or attach with
+    different forces, are refused.
 
     Weights and configured thresholds have the shape (thresholds, 1); ages with their weights,
     ``age`` and ``step``, and x, h [1/s] and ∫ h dt there, ``stretch``, ``rate`` and ``hazard``,

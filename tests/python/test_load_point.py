@@ -6,6 +6,7 @@ import time as clock
 
 import numpy as np
 import pytest
+from mesoslip.measured import load_point as stages_of_load_point
 from mesoslip.measured.load_point import drive_stages, stage_table
 
 UM = 1e-6
@@ -108,6 +109,18 @@ def test_errors_of_velocities_cover_the_velocities():
             for one, velocity in zip(found, (UM, 3 * UM), strict=True)
         ]
     assert 0.6 < np.std(pulls) < 1.5
+
+
+@pytest.mark.parametrize(("noise", "step"), [(0.1 * UM, 0.0), (0.0, 0.1 * UM)])
+def test_the_noise_of_a_sample(noise, step):
+    """Of samples at unequal times, and of digital steps, whose noise is that of rounding."""
+    rng = np.random.default_rng(1)
+    time = np.cumsum(rng.uniform(0.5, 1.5, 50_000))
+    value = 0.013 * UM * time + noise * rng.standard_normal(time.size)
+    value = np.round(value / step) * step if step else value
+    deviation, found = stages_of_load_point._sample_noise(time, value)
+    assert deviation == pytest.approx(noise or step / np.sqrt(12), rel=0.03)
+    assert found == pytest.approx(step, abs=1e-3 * UM)
 
 
 def test_what_cannot_have_stages():

@@ -7,7 +7,8 @@ import time as clock
 import numpy as np
 import pytest
 from mesoslip.measured import load_point as stages_of_load_point
-from mesoslip.measured.load_point import drive_stages, stage_table
+from mesoslip.measured.load_point import drive_stages
+from mesoslip.measured.output_groups import stage_group
 
 UM = 1e-6
 
@@ -142,7 +143,7 @@ def test_a_million_samples_take_seconds():
 
 def test_stages_as_a_group():
     stages = [(20, UM, UM), (20, 0, 0)]
-    table = stage_table(drive_stages(*load_point(stages, 10, 0.01 * UM)))
+    table = stage_group(drive_stages(*load_point(stages, 10, 0.01 * UM)))
     assert table.sizes["stage"] == 2
     np.testing.assert_array_equal(table["stage_number"], [0, 1])
     assert table["drive_velocity_error"].attrs["units"] == "m s-1"

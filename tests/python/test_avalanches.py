@@ -83,6 +83,8 @@ def test_sizes_in_stationary_sliding_are_those_of_a_branching_process(ratio, lar
     assert abs(sizes.mean() - (1 + 1 / ratio)) < 4 * error
     summary = mesoslip.avalanche_summary(tree, min_size=10)
     np.testing.assert_allclose(summary["slip_share"], r, rtol=0.02)
+    # All breaks but the first of each avalanche: 1 - 1/(1 + Nk/K) = r.
+    assert abs(summary["triggered_share"] - r) < 4 * error / sizes.mean() ** 2
     # An exponent of 3/2, and a cutoff that grows as K/(Nk) shrinks.
     assert abs(summary["exponent"] - 1.5) < 4 * summary["exponent_error"]
     cutoff = -1 / math.log(4 * r / (1 + r) ** 2)
@@ -141,6 +143,19 @@ def test_bursts_near_failure(bundles):
     assert len(sizes) > 500
     fit = fit_power_law(sizes, 1, 170, forms=(EXPONENTIAL_CUTOFF,), replicas=0)
     assert abs(fit.exponent - 1.5) < 4 * fit.exponent_error < 0.2
+
+
+def test_avalanches_near_failure_are_before_it(bundles):
+    """The avalanche at the maximum force is the failure."""
+    data = mesoslip.avalanches(bundles)
+    near = mesoslip.avalanches(bundles, min_force_ratio=0.999)
+    for realization in range(10):
+        mine, chosen = (
+            np.abs(one["force_before"].values[one["realization_index"].values == realization])
+            for one in (data, near)
+        )
+        before = mine[: np.argmax(mine)]
+        np.testing.assert_array_equal(chosen, before[before > 0.999 * mine.max()])
 
 
 def test_strength_of_a_bundle(bundles):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import shutil
 from types import SimpleNamespace
 
@@ -139,6 +140,15 @@ def test_draws_are_of_the_density():
     # A half-normal one.
     assert np.mean(draws[:, 1]) == pytest.approx(0.2 * np.sqrt(2 / np.pi), rel=0.06)
     assert np.max(r_hat(chains)) < 1.02
+
+
+def test_r_hat_compares_the_scatter_between_chains_with_that_within():
+    """Its square is 1 plus the variance of the means of half chains over the variance of each."""
+    chains = 3.0 * np.random.default_rng(4).standard_normal((2, 40_000, 1))
+    assert r_hat(chains) == pytest.approx([1.0], abs=1e-3)
+    # The means of the four halves are 0, 0, 3, 3, whose variance is 3, that of each half is 9.
+    chains[1] += 3.0
+    assert r_hat(chains) == pytest.approx([math.sqrt(1 + 3 / 9)], rel=5e-3)
 
 
 def test_statistics_of_a_simulation_come_from_all_others(monkeypatch):

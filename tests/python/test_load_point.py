@@ -6,7 +6,9 @@ import time as clock
 
 import numpy as np
 import pytest
-from mesoslip.measured.load_point import drive_stages, stage_table
+from mesoslip.measured import load_point as stages_of_load_point
+from mesoslip.measured.load_point import drive_stages
+from mesoslip.measured.output_groups import stage_group
 
 UM = 1e-6
 
@@ -110,6 +112,18 @@ def test_errors_of_velocities_cover_the_velocities():
     assert 0.6 < np.std(pulls) < 1.5
 
 
+@pytest.mark.parametrize(("noise", "step"), [(0.1 * UM, 0.0), (0.0, 0.1 * UM)])
+def test_the_noise_of_a_sample(noise, step):
+    """Of samples at unequal times, and of digital steps, whose noise is that of rounding."""
+    rng = np.random.default_rng(1)
+    time = np.cumsum(rng.uniform(0.5, 1.5, 50_000))
+    value = 0.013 * UM * time + noise * rng.standard_normal(time.size)
+    value = np.round(value / step) * step if step else value
+    deviation, found = stages_of_load_point._sample_noise(time, value)
+    assert deviation == pytest.approx(noise or step / np.sqrt(12), rel=0.03)
+    assert found == pytest.approx(step, abs=1e-3 * UM)
+
+
 def test_what_cannot_have_stages():
     assert drive_stages(np.arange(2.0), np.arange(2.0)) == ()
     still = drive_stages(np.arange(50.0), np.zeros(50))
@@ -129,7 +143,7 @@ def test_a_million_samples_take_seconds():
 
 def test_stages_as_a_group():
     stages = [(20, UM, UM), (20, 0, 0)]
-    table = stage_table(drive_stages(*load_point(stages, 10, 0.01 * UM)))
+    table = stage_group(drive_stages(*load_point(stages, 10, 0.01 * UM)))
     assert table.sizes["stage"] == 2
     np.testing.assert_array_equal(table["stage_number"], [0, 1])
     assert table["drive_velocity_error"].attrs["units"] == "m s-1"

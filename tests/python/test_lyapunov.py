@@ -139,6 +139,9 @@ def test_the_error_of_a_mean_rate_is_that_of_its_scatter():
     ratio = pooled(draws[0], lengths, together).error / pooled(draws[0], lengths, apart).error
     assert ratio == pytest.approx(2.0)
     assert math.isnan(pooled(np.array([1.0, 0.0]), np.array([1.0, 0.0]), np.arange(2.0)).error)
+    # Two twins: the standard deviation over the root of 2.
+    two = pooled(np.array([1.0, 3.0]), np.ones(2), np.array([0.0, 10.0]))
+    assert two == pytest.approx((2.0, 1.0))
 
 
 def test_the_exponent_of_a_map_is_the_mean_logarithm_of_its_slope():

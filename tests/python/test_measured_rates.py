@@ -22,7 +22,8 @@ from mesoslip.analysis.rate_and_state.correlated import estimate
 from mesoslip.analysis.rate_and_state.points import averaged
 from mesoslip.analysis.rate_and_state.search import Model
 from mesoslip.analysis.response import response, rows_of, tables
-from mesoslip.measured.load_point import drive_stages, stage_table
+from mesoslip.measured.load_point import drive_stages
+from mesoslip.measured.output_groups import stage_group
 from mesoslip.output import writing
 
 UM = 1e-6
@@ -55,7 +56,7 @@ def trace(law=LAW, stages=STEP, noise=3e-4, rate=10.0, *, trend=0.0, known=True,
             "configuration": f"[slider]\nstiffness = {STIFFNESS}\n" if known else "",
         },
     )
-    group = stage_table(drive_stages(time, load))
+    group = stage_group(drive_stages(time, load))
     return xr.DataTree.from_dict({"/": root, "/stages": group})
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import importlib.util
 import json
 import sys
@@ -21,6 +22,7 @@ from mesoslip.analysis.regime import (
     classify,
 )
 from mesoslip.analysis.regime.events import NO_SLIPS, Slips
+from scipy.stats import norm
 
 TIME = np.linspace(0.0, 1.0, 20001)
 
@@ -190,6 +192,21 @@ def test_shares_of_sticking_and_of_fast_sliding(klein):
     found = result(klein(), sawtooth(np.full(60, 1 / 50), np.full(60, 0.8)), velocity)
     assert found.stick_share == pytest.approx(0.4, abs=1e-3)
     assert found.fast_share == pytest.approx(0.3, abs=1e-3)
+
+
+def test_velocities_that_are_mostly_noise_have_no_shares(klein):
+    """If they were measured; the velocity of a run is exact."""
+    run = Scales.of_config(klein(), TIME[-1])
+    measured = dataclasses.replace(run, is_measured=True)
+    noise = np.random.default_rng(4).standard_normal(len(TIME))
+    for scales, deviation, share in (
+        (run, 1e-7, norm.cdf(-0.5)),
+        (measured, 0.5e-7, norm.cdf(-1.0)),
+        (measured, 1e-7, np.nan),
+    ):
+        force, velocity = np.full(len(TIME), 1e-5), 1e-7 + deviation * noise
+        found = classify(scales, TIME, force, velocity, NO_SLIPS)
+        assert found.stick_share == pytest.approx(share, abs=0.01, nan_ok=True)
 
 
 def test_amplitudes_are_fractions_of_the_static_force(klein):

@@ -109,11 +109,13 @@ def test_every_measure_of_a_run_with_known_slips():
     """A force made by hand: two slips of one micronewton, a second apart, after half a second."""
     times = np.linspace(0, 4, 401)
     force = np.where(times < 2, 0, 3e-6 - 1e-6 * (times % 1))
-    way = np.where((times * 10).astype(int) % 2 == 0, 0.0, 1.0).cumsum() * 1e-8
+    # Over the displacement of the drive: at rest, with it, and three times as fast, in turn.
+    ratio = np.array([0.0, 1.0, 3.0, 1.0])[(times * 10).astype(int) % 4]
+    displacement = ratio.cumsum() * 1e-8
     root = xr.Dataset(
         {
             "spring_force": (("realization", "time"), force[np.newaxis]),
-            "displacement": (("realization", "time"), way[np.newaxis]),
+            "displacement": (("realization", "time"), displacement[np.newaxis]),
             "drive_displacement": (("realization", "time"), 1e-8 * np.arange(401.0)[np.newaxis]),
             "breaks": ("realization", [7]),
             "energy_residual": ("realization", [1e-14]),

@@ -163,6 +163,31 @@ def test_a_table_becomes_an_output(tmp_path, command):
         mesoslip.plot(bare, x="displacement")
 
 
+def test_the_noise_of_a_trace_is_estimated_or_given(tmp_path):
+    """Impulses are no motion. If the noise is given, they are kept, and slips are above it."""
+    run = mesoslip.run(klein_tables(**HIDDEN))
+    time, force = sampled(run, 1e-7)
+    force[1000] += 5e-6
+
+    def trace(**options):
+        rows = "".join(f"{t:.4f},{1e6 * f:.4f}\n" for t, f in zip(time, force, strict=True))
+        table = write(tmp_path / "trace.csv", f"time [s],force [uN]\n{rows}")
+        return mesoslip.read_trace(table, velocity="0.1 um/s", stiffness="140 N/m", **options)
+
+    tree = trace()
+    assert tree.attrs["noise"] == pytest.approx(1e-7, rel=0.05)
+    assert tree["noise"]["deviation"].item() == tree.attrs["noise"]
+    assert tree["noise"]["impulse_time"].values == pytest.approx([time[1000]])
+    few, more = (trace(noise=f"{size} uN") for size in (0.2, 0.4))
+    assert few.attrs["noise"] == pytest.approx(2e-7)
+    assert "noise" not in few.children
+    assert tree.attrs["min_fall"] < few.attrs["min_fall"] < more.attrs["min_fall"]
+    # The impulse would be a stretch of the spring within some samples.
+    around = slice(990, 1010)
+    speed, wrong = (np.abs(one["velocity"].values[0, around]).max() for one in (tree, few))
+    assert speed < 0.3 * wrong
+
+
 def test_with_a_configuration_it_is_an_output_of_that(tmp_path):
     table = write(tmp_path / "trace.csv", SINE)
     tree = mesoslip.read_trace(table, config=ROOT / "runs" / "klein.toml")

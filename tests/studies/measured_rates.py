@@ -17,7 +17,8 @@ import numpy as np
 import xarray as xr
 from mesoslip.analysis.experiment_stages import Experiment
 from mesoslip.analysis.rate_and_state import measured_rows
-from mesoslip.measured.load_point import drive_stages, stage_table
+from mesoslip.measured.load_point import drive_stages
+from mesoslip.measured.output_groups import stage_group
 from scipy.integrate import solve_ivp
 
 UM = 1e-6
@@ -119,7 +120,7 @@ def trace(truth: Truth, seed: int) -> xr.DataTree:
             "configuration": f"[slider]\nstiffness = {truth.stiffness!r}\n",
         },
     )
-    stages = stage_table(drive_stages(time, load))
+    stages = stage_group(drive_stages(time, load))
     return xr.DataTree.from_dict({"/": root, "/stages": stages})
 
 

@@ -13,13 +13,7 @@ from mesoslip.configuration.columns import IGNORED
 from mesoslip.configuration.units import NUMBER, number_of, to_si
 from mesoslip.errors import ConfigError, FileError, Problem, shown
 from mesoslip.measured.description import Column, Columns
-from mesoslip.measured.headers import (
-    EITHER,
-    QUANTITIES,
-    Heading,
-    name_of,
-    read_header,
-)
+from mesoslip.measured.headers import EITHER, QUANTITIES, Heading, name_of, read_header
 from mesoslip.measured.reading.table import Array, Table, listed
 from mesoslip.measured.units import plain, size_of, unit_named
 
@@ -34,7 +28,7 @@ EXAMPLES = {
     "load_point": "load_point [um]",
     "displacement": "displacement [nm]",
 }
-# Headers in options and tables may be these names too.
+# Other names in the headers of options and tables.
 OTHER_NAMES = {
     "spring_force": "force",
     "drive": "load_point",
@@ -42,41 +36,34 @@ OTHER_NAMES = {
     "friction_coefficient": "friction",
     "mu": "friction",
 }
-# Numbers that stand for missing ones where they lie far from all others; from the last on always.
+# Numbers that stand for missing ones if they are far from all others, and the minimum size of
+# numbers that always do.
 SENTINELS = (-9999.0, -99999.0, -999.0, -999.25, -9999.25, 9999.0, 99999.0, 999999.0, -99.99)
 MIN_ALWAYS = 1e30
 # Minimum distance from the range of 80 % of the others, over that range.
 SENTINEL_DISTANCE = 1.0
-# Maximum correlation of steps of force and displacement of a load point.
-MAX_LOAD_POINT = -0.3
+# Maximum correlation of steps of the force with those of the displacement of a slider.
+MAX_SLIDER = -0.3
+# Quantities that are a force or become one, in order of preference.
+FORCES = ("force", "shear_stress", "friction")
 
 
 @dataclass
 class Used:
-    """A column that is used.
-
-    Attributes
-    ----------
-    index
-        Its number, from 0.
-    unit
-        Its unit as written; empty if it has none.
-    size, offset
-        A number of the file minus the offset, times the size, is the quantity in SI.
-    guess
-        Doubts about it.
-    """
+    """A used column: (number - offset) x size is the quantity in SI."""
 
     index: int
     unit: str
+    """Its unit as written; may be empty."""
     size: float
     offset: float = 0.0
     guess: str = ""
+    """Doubts about it."""
 
 
 @dataclass
 class Assignment:
-    """Which columns are used, and notes about the others."""
+    """The used columns by quantity, and notes about the others by index."""
 
     used: dict[str, Used] = field(default_factory=dict)
     unused: dict[int, str] = field(default_factory=dict)
@@ -84,23 +71,9 @@ class Assignment:
 
 
 def assign(table: Table, columns: Columns, headers: str | None) -> Assignment:
-    """Find out what each column of a file holds.
+    """Find the quantity of each column, from its description, or else from its header.
 
-    Parameters
-    ----------
-    table
-        The file.
-    columns
-        Columns as described.
-    headers
-        Headers instead of those of the file.
-
-    Raises
-    ------
-    FileError
-        If a column that is needed has no unit or a wrong one, or two hold the same.
-    ConfigError
-        If a described column is not in the file, or its factor is not of the right dimension.
+    ``headers`` replace those of the file.
     """
     given = None if headers is None else _given(table, headers)
     found = Assignment()
@@ -142,7 +115,7 @@ def _given(table: Table, headers: str) -> list[str]:
 
 
 def _explicit(table: Table, header: str) -> Heading:
-    """Meaning of a header in an option, where a displacement is the slider's."""
+    """Meaning of a header in an option, which must name a quantity."""
     heading = read_header(header)
     name = re.sub(r"\s*[\[({].*", "", header).strip().lower().replace(" ", "_")
     quantity = name if name in QUANTITIES else OTHER_NAMES.get(name, heading.quantity)
@@ -156,13 +129,7 @@ def _explicit(table: Table, header: str) -> Heading:
 
 
 def _described(table: Table, name: str, column: Column) -> Used:
-    """A column as a table describes it.
-
-    Raises
-    ------
-    ValueError
-        If there is none, or its units do not agree.
-    """
+    """A column as a table describes it; a ValueError if it is missing or its units disagree."""
     index = _index_of(table, column.column)
     heading = read_header(table.headers[index], table.units[index])
     unit = plain(column.unit if column.unit is not None else heading.unit or "")
@@ -202,13 +169,7 @@ def _names(headers: Sequence[str]) -> str:
 
 
 def _size(unit: str, quantity: str, header: str) -> tuple[float, str]:
-    """Size of a unit, and what could be wrong.
-
-    Raises
-    ------
-    ValueError
-        If it is missing or of another dimension.
-    """
+    """Size of a unit, and doubts about it; a ValueError if it has another dimension."""
     si, right = QUANTITIES[quantity], f"write it as {EXAMPLES[quantity]!r}"
     if not unit and si == "1":
         return 1.0, ""
@@ -230,7 +191,7 @@ def _size(unit: str, quantity: str, header: str) -> tuple[float, str]:
 
 
 def size_of_voltage(unit: str) -> float | None:
-    """Size of a unit of voltage [V]; None if it is not one."""
+    """Size of a unit of voltage [V]; None for other units."""
     try:
         found = size_of(unit, "V")
     except ValueError:
@@ -243,13 +204,7 @@ def _factor_example(si: str) -> str:
 
 
 def _factor(text: str, unit: str, si: str) -> tuple[float, str]:
-    """A factor in SI for one unit of a column, and that unit.
-
-    Raises
-    ------
-    ValueError
-        If it is not of the right dimension.
-    """
+    """A factor in SI for one unit of a column, and that unit; a ValueError for other dimensions."""
     text = plain(text)
     try:
         # A quantity for each number of the column, whatever its unit.
@@ -291,13 +246,7 @@ def _is_number(text: str) -> bool:
 
 
 def _offset(text: str | None, unit: str) -> float:
-    """The number to subtract, in the unit of a column.
-
-    Raises
-    ------
-    ValueError
-        If it is not in that unit.
-    """
+    """The number to subtract, in the unit of a column; a ValueError for other units."""
     if text is None:
         return 0.0
     text = plain(text)
@@ -324,17 +273,14 @@ def _from_headings(table: Table, headings: Mapping[int, Heading], found: Assignm
         if heading.quantity is not None:
             by_quantity.setdefault(heading.quantity, []).append(index)
     either = by_quantity.pop(EITHER, [])
-    forces = {"force", "shear_stress", "friction"}
-    has_force = bool(forces & found.used.keys())
+    has_force = not found.used.keys().isdisjoint(FORCES)
     for quantity, indices in by_quantity.items():
-        if quantity in found.used or (
-            has_force and quantity in {"force", "shear_stress", "friction"}
-        ):
+        if quantity in found.used or (has_force and quantity in FORCES):
             continue
         if len(indices) > 1:
             _two(table, quantity, indices, found)
-            continue
-        _use(table, quantity, indices[0], headings[indices[0]], found)
+        else:
+            _use(table, quantity, indices[0], headings[indices[0]], found)
     for index in either:
         found.unused[index] = "a displacement of the load point or of the slider?"
     if len(either) == 1 and not ({"load_point", "displacement"} <= found.used.keys()):
@@ -342,9 +288,9 @@ def _from_headings(table: Table, headings: Mapping[int, Heading], found: Assignm
 
 
 def _two(table: Table, quantity: str, indices: Sequence[int], found: Assignment) -> None:
-    """Two columns of one quantity: an error, if it is needed."""
+    """Refuse two columns of a quantity that is needed; ignore those of others."""
     headers = " and ".join(shown(table.headers[one]) for one in indices)
-    if quantity in {"time", "force", "shear_stress", "friction"}:
+    if quantity in {"time", *FORCES}:
         raise FileError(
             f"{table.path}: has two columns of {quantity.replace('_', ' ')}: {headers}; name one "
             f"in [trace.columns], or ignore one in --columns with '{IGNORED}'"
@@ -370,7 +316,7 @@ def _use(table: Table, quantity: str, index: int, heading: Heading, found: Assig
 
 
 def _use_either(table: Table, index: int, heading: Heading, found: Assignment) -> None:
-    """Use a displacement as that of the load point or of the slider, by how it moves."""
+    """Use a displacement as that of the load point or of the slider, depending on its motion."""
     if "load_point" in found.used:
         quantity, why = "displacement", "as the load point has a column of its own"
     elif "displacement" in found.used:
@@ -390,10 +336,7 @@ def _use_either(table: Table, index: int, heading: Heading, found: Assignment) -
 
 def _moves_in_slips(table: Table, index: int, found: Assignment) -> bool:
     """Whether a displacement moves ahead where the force falls, as that of a slider does."""
-    force = next(
-        (found.used[one] for one in ("force", "shear_stress", "friction") if one in found.used),
-        None,
-    )
+    force = next((found.used[one] for one in FORCES if one in found.used), None)
     if force is None:
         return False
     x, f = table.values[index], force.size * table.values[force.index]
@@ -402,17 +345,11 @@ def _moves_in_slips(table: Table, index: int, found: Assignment) -> bool:
     if len(steps) < 3 or np.std(steps) == 0 or np.std(falls) == 0:
         return False
     direction = 1.0 if x[known][-1] >= x[known][0] else -1.0
-    return bool(direction * np.corrcoef(steps, falls)[0, 1] < MAX_LOAD_POINT)
+    return bool(direction * np.corrcoef(steps, falls)[0, 1] < MAX_SLIDER)
 
 
 def values_of(table: Table, name: str, used: Used) -> Array:
-    """Values of a column in SI; NaN where there are none.
-
-    Raises
-    ------
-    FileError
-        If a cell is not a number.
-    """
+    """Values of a column in SI; NaN for missing cells."""
     bad = table.bad.get(used.index)
     if bad:
         first, *others = bad
@@ -434,7 +371,7 @@ def sentinels(table: Table, used: Used) -> tuple[NDArray[np.bool], str]:
     found = finite & (np.abs(values) >= MIN_ALWAYS)
     rest = values[finite & ~np.isin(values, SENTINELS) & ~found]
     if rest.size:
-        # Impulses and damaged rows must not count.
+        # Percentiles exclude impulses and damaged rows.
         low, high = (float(one) for one in np.percentile(rest, [10, 90]))
         span = SENTINEL_DISTANCE * (high - low)
         known = finite & np.isin(values, SENTINELS)

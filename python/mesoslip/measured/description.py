@@ -17,15 +17,14 @@ from mesoslip.configuration.messages import problems
 from mesoslip.configuration.table import Table, Text, Whole, problem
 from mesoslip.configuration.units import number_of, to_si
 from mesoslip.errors import ConfigError, Problem, shown
-from mesoslip.measured.record import Record
 
 
 def _checked_quantity(
     value: object, units: tuple[str, ...], example: str, minimum: float | None, is_open: bool
 ) -> str:
-    """A quantity as text with its unit, checked for its dimension; numbers are in the first."""
+    """A quantity as text with its unit, checked for its dimension."""
     if isinstance(value, str):
-        # A plain number is in SI, as everywhere.
+        # A plain number is in SI.
         with suppress(ValueError):
             value = number_of(value.strip())
     errors = []
@@ -37,7 +36,7 @@ def _checked_quantity(
             continue
         if minimum is not None and (number < minimum or (is_open and number == minimum)):
             raise ValueError(f"must be {'greater than' if is_open else 'at least'} {minimum:g}")
-        # A plain number of a force or a coefficient has the unit of the record.
+        # A plain number for a force or a coefficient has the unit of the record.
         named = "" if len(units) > 1 else f" {unit}"
         return value if isinstance(value, str) else f"{number!r}{named}"
     raise errors[0]
@@ -233,32 +232,15 @@ class Experiment(Table):
     """The measurement."""
 
 
-# Tables of such a file that other commands read.
+# Tables of such a file that are not part of the model.
 OTHER_TABLES = ("fit", "trace")
 
 
 def describe(file: Path, options: Mapping[str, Any]) -> tuple[Experiment, Path, Config | None]:
-    """The description of a measurement.
+    """The description of a measurement, its path, and the configuration of a model, if any.
 
-    Parameters
-    ----------
-    file
-        The file of the measurement, or a TOML file with a table [trace] that names it.
-    options
-        Keys of the table that replace those of the file.
-
-    Returns
-    -------
-    tuple
-        The description, the path of the measurement, and the configuration of a model if the file
-        has one.
-
-    Raises
-    ------
-    FileError
-        If a TOML file cannot be read.
-    ConfigError
-        If the description is wrong; all errors at once.
+    The file is that of the measurement, or a TOML file with a table [trace], whose keys the options
+    replace.
     """
     changes = {name: value for name, value in options.items() if value is not None}
     if file.suffix.lower() != ".toml":
@@ -278,18 +260,6 @@ def describe(file: Path, options: Mapping[str, Any]) -> tuple[Experiment, Path, 
     return experiment, file.parent / experiment.trace.file, model_of(tables, str(file))
 
 
-def resolve(trace: TraceDescription, record: Record) -> TraceDescription:
-    """A description with the columns that were found, so that it repeats the reading."""
-    columns = dict(trace.columns)
-    for one in record.columns:
-        if one.use and columns.get(one.use) is None:
-            unit = one.unit or None
-            columns[one.use] = Column(column=one.reference, unit=unit)
-    return trace.model_copy(
-        update={"columns": {key: one for key, one in columns.items() if one}, "headers": None}
-    )
-
-
 def option_name(key: str) -> str:
     """The option of a command for a key of the table."""
     name = key.removeprefix("trace.")
@@ -304,7 +274,7 @@ def _checked(tables: Mapping[str, Any], source: str) -> Experiment:
 
 
 def model_of(tables: Mapping[str, Any], source: str) -> Config | None:
-    """The configuration of the model in a file, beside tables of other commands; None without."""
+    """The configuration of the model among the tables of a file, if any."""
     rest = {name: table for name, table in tables.items() if name not in OTHER_TABLES}
     if not rest.keys() - {"title"}:
         return None
@@ -312,15 +282,7 @@ def model_of(tables: Mapping[str, Any], source: str) -> Config | None:
 
 
 def config_of_file(config: object) -> Config:
-    """The configuration of an experiment, from a file that may have [fit] and [trace] beside it.
-
-    Raises
-    ------
-    FileError
-        If a file cannot be read.
-    ConfigError
-        If it is wrong.
-    """
+    """The configuration of an experiment, from a file that may have [fit] and [trace] too."""
     from mesoslip.output.inputs import as_config
 
     if isinstance(config, Mapping):

@@ -1,4 +1,4 @@
-"""Headers of columns: which quantity, in which unit."""
+"""Headers of columns: quantities and units."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ QUANTITIES = {
     "load_point": "m",
     "displacement": "m",
 }
-# A displacement of the load point or of the slider: the header does not say of which.
+# A displacement, of the load point or of the slider.
 EITHER = "either"
 
 # Names of the field, in lower case, without punctuation.
@@ -56,26 +56,19 @@ BRACKETS = re.compile(r"\[([^\]]*)\]|\(([^)]*)\)|\{([^}]*)\}|<([^>]*)>")
 
 
 class Heading(NamedTuple):
-    """Meaning of a header.
-
-    Attributes
-    ----------
-    quantity
-        One of `QUANTITIES` or `EITHER`; None if the name is not known.
-    unit
-        The unit as it is written; None without one.
-    guess
-        Doubts about it; otherwise empty.
-    """
+    """Meaning of a header."""
 
     quantity: str | None
+    """One of `QUANTITIES` or `EITHER`; None if the name is not known."""
     unit: str | None
+    """The unit as it is written."""
     guess: str = ""
+    """Doubts about it."""
 
 
 def name_of(text: str) -> str:
     """A name in lower case, without punctuation."""
-    # A Greek letter alone is the friction coefficient, beside others a prefix.
+    # A Greek mu alone is the friction coefficient, before a letter a prefix.
     text = re.sub(r"[µμ](?![A-Za-z])", "mu", text.replace("Âµ", "µ").replace("Î¼", "μ"))
     return re.sub(r"[^a-z0-9τσ]+", " ", text.lower()).strip()
 
@@ -87,7 +80,7 @@ def meaning_of(name: str) -> str | None:
 
 
 def read_header(header: str, unit: str = "") -> Heading:
-    """Meaning of a header, with the unit of a line of units below it.
+    """Meaning of a header; ``unit`` is that of a line of units below it.
 
     >>> read_header("Normal_stress(MPa)"), read_header("lp_disp_um")
     (Heading(quantity='normal_stress', unit='MPa', guess=''), \
@@ -97,7 +90,7 @@ Heading(quantity='load_point', unit='um', guess=''))
     unit = unit.strip("[](){}<> ")
     if unit:
         return Heading(meaning_of(_without_brackets(text)) or meaning_of(text), unit)
-    # A force in newton, or a normal force without a unit?
+    # Either a force in newtons, or a normal force without a unit.
     if re.fullmatch(r"(?i)f_?n", text):
         return Heading(None, None)
     whole = meaning_of(text)
@@ -125,7 +118,7 @@ def _without_brackets(text: str) -> str:
 
 
 def _fits(unit: str, quantity: str) -> bool:
-    """Whether a unit is one of a quantity, or of a voltage that a factor is for."""
+    """Whether a unit is one of a quantity."""
     si = QUANTITIES.get(quantity, "m")
     try:
         return size_of(unit, si) is not None
@@ -134,7 +127,7 @@ def _fits(unit: str, quantity: str) -> bool:
 
 
 def _divided(text: str) -> Iterator[tuple[str, str]]:
-    """Ways to divide a header into a name and a unit, the most explicit first."""
+    """Divisions of a header into a name and a unit, the most explicit first."""
     for match in BRACKETS.finditer(text):
         inside = next(one for one in match.groups() if one is not None)
         outside = text[: match.start()] + " " + text[match.end() :]

@@ -2,8 +2,8 @@
 
 The displacement is a sequence of straight lines and parabolas, with noise. The partition of least
 squares with a penalty for each piece is found exactly, by dynamic programming (Jackson et al., IEEE
-Signal Processing Letters 12, 105 (2005)), on means of samples; means near the changes are made of
-fewer and fewer samples, until they are samples.
+Signal Processing Letters 12, 105 (2005)), on means of samples. In repeated passes, means near the
+changes have fewer and fewer samples, down to one.
 """
 
 from __future__ import annotations
@@ -12,23 +12,16 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mesoslip.output import variables
-
-if TYPE_CHECKING:
-    import xarray as xr
-
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-# Maximum number of means; half of them are spent around changes.
+# Maximum number of means; half of them are around changes.
 MAX_POINTS = 1000
-# Passes, in each of which means near changes are made of fewer samples, and the number of means on
-# either side of a change that are divided.
+# Number of passes, and number of means on either side of a change that are divided in a pass.
 PASSES = 4
 NEAR = 3
 # Penalties of a line and of a parabola, in units of the variance of the noise: chance improves
@@ -39,23 +32,24 @@ PARABOLA_PENALTY = 65.0
 MIN_LINE, MIN_PARABOLA = 3, 5
 # Minimum relative change of the velocity from stage to stage, and within a ramp.
 MIN_CHANGE = 0.2
-# A ramp continues the velocities beside it if they differ by less than this share of its change.
+# Maximum difference of a velocity from that of a ramp beside it, over the change in the ramp, for
+# the two to be equal.
 RAMP_SHARE = 0.25
 # Distances of points over which noise is compared, and the minimum number of differences.
 LAGS = (1, 2, 4, 8)
 MIN_DIFFERENCES = 40
-# Multiples of a digital step that its differences are compared with.
+# Maximum multiple of a digital step among the differences that determine it.
 MAX_MULTIPLE = 20.0
-# Maximum number of pieces of an excursion from a constant velocity.
+# Maximum number of pieces of an excursion from a constant velocity, and its maximum duration over
+# those of the pieces before and after.
 MAX_EXCURSION = 6
-# Its maximum duration over those of the pieces before and after.
 MAX_EXCURSION_SHARE = 0.2
-# Means on either side from which the speed is estimated at which digital steps are passed.
+# Means on either side from which the rate of digital steps is estimated.
 STEP_WINDOW = 20
 # Maximum velocity of a hold over the maximum velocity, and in standard errors.
 HOLD_RATIO = 1e-4
 HOLD_ERRORS = 3.0
-# Minimum noise over the range of the displacement: rounding.
+# Minimum noise by rounding, over the range of the displacement, and in metres.
 MIN_NOISE = 1e-9
 MIN_DEVIATION = 1e-15
 # Median of the absolute value of a standard normal deviate.
@@ -64,16 +58,9 @@ NORMAL_MEDIAN = 0.6744897501960817
 
 @dataclass(frozen=True)
 class DriveStage:
-    """A stage of the drive.
+    """A stage of the drive: times [s] and velocities of the load point [m/s].
 
-    Attributes
-    ----------
-    start, end
-        Times [s].
-    start_velocity, end_velocity
-        Velocities of the load point [m/s]; equal but for a ramp, 0 for a hold.
-    velocity_error
-        Standard error of the mean velocity [m/s].
+    The velocities are equal except in a ramp, and 0 in a hold.
     """
 
     start: float
@@ -81,6 +68,7 @@ class DriveStage:
     start_velocity: float
     end_velocity: float
     velocity_error: float
+    """Standard error of the mean velocity."""
 
     @property
     def velocity(self) -> float:
@@ -97,9 +85,10 @@ class DriveStage:
 
 @dataclass(frozen=True)
 class _Points:
-    """Means of samples: first sample of each and the end, times, values, variances."""
+    """Means of samples."""
 
     edges: Integers
+    """First sample of each mean, and the end."""
     time: Array
     value: Array
     variance: Array
@@ -107,16 +96,17 @@ class _Points:
 
 @dataclass(frozen=True)
 class _Piece:
-    """A line or parabola through points ``first`` to ``after``: value and velocity at its mean
-    time, acceleration, and standard error of the velocity."""
+    """A line or parabola through points ``first`` to ``after - 1``."""
 
     first: int
     after: int
     time: float
+    """Mean time, to which value and velocity belong."""
     value: float
     velocity: float
     acceleration: float
     error: float
+    """Standard error of the velocity."""
 
     def at(self, time: float) -> tuple[float, float]:
         """Value and velocity at a time."""
@@ -126,21 +116,10 @@ class _Piece:
 
 
 def drive_stages(time: Array, load_point: Array) -> tuple[DriveStage, ...]:
-    """Stages of the drive: times and velocities between changes of the velocity.
+    """Stages between changes of the velocity, from the first sample to the last.
 
-    Parameters
-    ----------
-    time
-        Times [s], increasing, at any intervals, shape (samples,).
-    load_point
-        Displacement of the load point [m], shape (samples,); samples that are not finite are left
-        out.
-
-    Returns
-    -------
-    tuple of DriveStage
-        From the first sample to the last one. Changes of the velocity by less than 20 % are
-        wander of the drive, and no stages.
+    Times [s] increase at any intervals; displacements [m] that are not finite are left out. Smaller
+    changes than 20 % are wander of the drive.
     """
     known = np.isfinite(load_point) & np.isfinite(time)
     time, load_point = time[known], load_point[known]
@@ -163,24 +142,24 @@ def drive_stages(time: Array, load_point: Array) -> tuple[DriveStage, ...]:
 
 
 def _sample_noise(time: Array, values: Array) -> tuple[float, float]:
-    """Standard deviation of the noise of a sample, and the digital step (0 without)."""
+    """Standard deviation of the noise of a sample, and the digital step, 0 without one."""
     size = values.size
     step = _digital_step(values)
     if size < 5:
         return step / math.sqrt(12), step
-    # Each sample against the line through its neighbours.
+    # Distance of each sample from the line through its neighbours.
     share = (time[1:-1] - time[:-2]) / (time[2:] - time[:-2])
     residual = values[1:-1] - (1 - share) * values[:-2] - share * values[2:]
     residual = residual / np.sqrt(1 + share**2 + (1 - share) ** 2)
-    # Where a drive is recorded in steps, more than half of the samples have no residual.
+    # In a record with digital steps, more than half of the residuals may be 0.
     deviation = float(np.median(np.abs(residual))) / NORMAL_MEDIAN
     return max(deviation, MIN_NOISE * float(np.ptp(values)), step / math.sqrt(12)), step
 
 
 def _digital_step(values: Array) -> float:
-    """Digital step of a record, 0 without: differences of its values are multiples of it."""
+    """Digital step of a record, of which differences are multiples; 0 without one."""
     steps = np.diff(np.unique(values))
-    # Rounding makes equal values differ.
+    # Equal values may differ by rounding.
     steps = steps[steps > MIN_NOISE * float(np.ptp(values))]
     if steps.size == 0:
         return 0.0
@@ -192,10 +171,10 @@ def _digital_step(values: Array) -> float:
 
 
 def _inflated(points: _Points) -> _Points:
-    """Points with the variance of noise that is correlated from one to the next.
+    """Points with a variance that includes the correlation of the noise from one to the next.
 
-    Third differences over several distances have no part of lines and parabolas, and their median
-    none of the few changes.
+    Lines and parabolas do not contribute to third differences, and the few changes hardly to their
+    median.
     """
     factor = 1.0
     for lag in LAGS:
@@ -216,17 +195,20 @@ def _inflated(points: _Points) -> _Points:
 
 
 def _even_edges(values: Array, count: int) -> Integers:
-    """First samples of means, and the end: at most ``count`` means of as many samples each, divided
-    where they pass more than their share of the path, so that a short stage has some too."""
+    """First samples of means, and the end.
+
+    These are at most ``count`` means of equal numbers of samples. Means with more than their share
+    of the path are divided, so that a short stage has some too.
+    """
     size = values.size
     edges = np.unique(np.linspace(0, size, min(size, count) + 1).astype(np.int64))
     means = np.add.reduceat(values, edges[:-1]) / np.diff(edges)
-    passed = np.abs(np.diff(means, prepend=means[0], append=means[-1]))
-    passed = np.maximum(passed[:-1], passed[1:])
-    total = float(passed.sum())
+    path = np.abs(np.diff(means, prepend=means[0], append=means[-1]))
+    path = np.maximum(path[:-1], path[1:])
+    total = float(path.sum())
     if total == 0:
         return edges
-    parts = np.maximum(1, np.ceil(count * passed / total)).astype(np.int64)
+    parts = np.maximum(1, np.ceil(count * path / total)).astype(np.int64)
     divided = [
         np.linspace(begin, end, min(part, end - begin) + 1).astype(np.int64)
         for begin, end, part in zip(edges[:-1], edges[1:], parts, strict=True)
@@ -274,7 +256,7 @@ def _partition(points: _Points) -> list[int]:
 
 
 def _costs(points: _Points, start: int) -> Array:
-    """Cost of one piece from a point up to each later one."""
+    """Cost of one piece from a point to each later one."""
     weight = 1 / points.variance[start:]
     scale = max(float(points.time[-1] - points.time[start]), 1e-300)
     t = (points.time[start:] - points.time[start]) / scale
@@ -294,7 +276,7 @@ def _costs(points: _Points, start: int) -> Array:
         line = rest - c1**2 / g1
         p = s2 / s0
         q = (s3 - m * s2) / g1
-        # The norm of t^2 - p - q (t - m), and its product with x.
+        # The squared norm of t^2 - p - q (t - m), and its product with x.
         g2 = s4 - p * s2 - q * (s3 - m * s2)
         c2 = y2 - p * y0 - q * c1
         parabola = line - c2**2 / g2
@@ -304,7 +286,7 @@ def _costs(points: _Points, start: int) -> Array:
         np.maximum(parabola, 0) + PARABOLA_PENALTY,
         np.inf,
     )
-    # The whole record may be shorter than any piece.
+    # A record may be shorter than any piece.
     if start == 0 and t.size < MIN_LINE:
         line[-1] = 0.0
     cost: Array = np.minimum(line, parabola)
@@ -312,7 +294,7 @@ def _costs(points: _Points, start: int) -> Array:
 
 
 def _refined(points: _Points, bounds: Sequence[int]) -> Integers:
-    """Edges with more of them around the bounds of pieces."""
+    """Edges with additional ones around the bounds of pieces."""
     inner = bounds[1:-1]
     if not inner:
         return points.edges
@@ -331,7 +313,7 @@ def _refined(points: _Points, bounds: Sequence[int]) -> Integers:
 
 
 def _fitted(points: _Points, first: int, after: int) -> _Piece:
-    """The line or parabola of a piece, whichever its cost prefers."""
+    """The line or parabola through points, whichever has the lower cost."""
     inside = slice(first, after)
     w, t, x = 1 / points.variance[inside], points.time[inside], points.value[inside]
     middle = float(np.average(t, weights=w))
@@ -358,7 +340,7 @@ def _fitted(points: _Points, first: int, after: int) -> _Piece:
 
 
 def _inflation(residual: Array, parameters: int) -> float:
-    """Factor of the variance of a line's slope, as residuals exceed the noise or are correlated."""
+    """Factor of the variance of a slope for residuals that exceed the noise or are correlated."""
     freedom = max(residual.size - parameters, 1)
     square = max(float(residual @ residual) / freedom, 1e-300)
     if residual.size < 20:
@@ -374,7 +356,7 @@ def _inflation(residual: Array, parameters: int) -> float:
 
 
 def _merged(points: _Points, pieces: list[_Piece]) -> list[_Piece]:
-    """Pieces without changes of the velocity that are wander of the drive."""
+    """Pieces joined where the velocity changes by no more than wander of the drive."""
     top = max(max(abs(one.velocity) for one in pieces), 1e-300)
     while len(pieces) > 1:
         changes = [_change(points, one, other, top) for one, other in pairwise(pieces)]
@@ -391,8 +373,10 @@ def _merged(points: _Points, pieces: list[_Piece]) -> list[_Piece]:
 
 
 def _without_excursion(points: _Points, pieces: list[_Piece], top: float) -> list[_Piece] | None:
-    """Pieces without a short excursion from a constant velocity that ends where the displacement
-    is as without it; None if there is none."""
+    """Pieces without the first short excursion from a constant velocity; None without excursions.
+
+    After an excursion, the displacement continues as if there had been none.
+    """
     time = points.time
     for first in range(len(pieces) - 2):
         for last in range(first + 2, min(first + 2 + MAX_EXCURSION, len(pieces))):
@@ -413,7 +397,7 @@ def _without_excursion(points: _Points, pieces: list[_Piece], top: float) -> lis
 
 
 def _change(points: _Points, one: _Piece, other: _Piece, top: float) -> float:
-    """Relative change of the velocity from a piece to the next, with that within them."""
+    """Relative change of the velocity over a piece and the next."""
     velocities = [
         piece.at(float(points.time[index]))[1]
         for piece in (one, other)
@@ -427,7 +411,7 @@ def _change(points: _Points, one: _Piece, other: _Piece, top: float) -> float:
 def _stages(
     time: Array, points: _Points, pieces: list[_Piece], origin: float
 ) -> tuple[DriveStage, ...]:
-    """Stages out of pieces, which meet where their displacements are equal."""
+    """Stages from pieces, which meet where their displacements are equal."""
     top = max(max(abs(one.velocity) for one in pieces), 1e-300)
     ramps = [_is_ramp(points, one, top) for one in pieces]
     # Velocities of pieces at their starts and ends, and the times at which they meet.
@@ -449,7 +433,7 @@ def _stages(
             length = float(points.time[curved.after - 1] - points.time[curved.first])
             change = abs(curved.acceleration) * length
             if abs(curved.at(meeting)[1] - velocity) < RAMP_SHARE * change:
-                # They touch, so that their velocities fix the time better.
+                # A line that touches the parabola: the velocities determine the time better.
                 touching = curved.time + (velocity - curved.velocity) / curved.acceleration
                 if abs(touching - meeting) < RAMP_SHARE * length:
                     meeting = touching
@@ -481,7 +465,7 @@ def _is_ramp(points: _Points, one: _Piece, top: float) -> bool:
 def _meeting(points: _Points, one: _Piece, other: _Piece) -> float:
     """Time between two pieces at which their displacements are equal."""
     low, high = float(points.time[one.after - 1]), float(points.time[other.first])
-    # Noise may move it beyond the gap between them.
+    # Noise may move the intersection beyond the gap between the pieces.
     reach = max(
         high - low,
         3 * (points.variance[one.after - 1] ** 0.5 + points.variance[other.first] ** 0.5)
@@ -496,31 +480,3 @@ def _meeting(points: _Points, one: _Piece, other: _Piece) -> float:
     roots = middle + np.real(roots[np.abs(np.imag(roots)) < 1e-9 * max(reach, 1e-300)])
     inside = roots[(roots >= low_end) & (roots <= high_end)]
     return float(inside[np.argmin(np.abs(inside - middle))]) if inside.size else middle
-
-
-def stage_table(stages: Sequence[DriveStage]) -> xr.Dataset:
-    """Stages as the group ``stages`` of an output.
-
-    Parameters
-    ----------
-    stages
-        The stages.
-    """
-    import xarray as xr
-
-    columns = {
-        "realization_index": [0] * len(stages),
-        "stage_number": list(range(len(stages))),
-        "stage_start_time": [one.start for one in stages],
-        "stage_end_time": [one.end for one in stages],
-        "drive_start_velocity": [one.start_velocity for one in stages],
-        "drive_end_velocity": [one.end_velocity for one in stages],
-        "drive_velocity_error": [one.velocity_error for one in stages],
-    }
-    group = variables.MEASURED_STAGES
-    return xr.Dataset(
-        {
-            name: group.variable(name, ("stage",), np.array(values, dtype=group[name].dtype))
-            for name, values in columns.items()
-        }
-    )

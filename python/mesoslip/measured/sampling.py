@@ -20,37 +20,27 @@ Numbers = NDArray[np.int_]
 
 # Minimum interval of a gap, over the usual one around it.
 MIN_GAP = 1.5
-# Samples on each side whose median interval is the usual one.
+# Number of intervals on each side in the median that is the usual interval.
 AROUND = 15
-# Intervals of one rate differ by less than this factor.
+# Maximum ratio of intervals at one rate.
 SAME_RATE = 1.3
 # Minimum number of samples at one rate.
 MIN_SAMPLES = 20
 # Maximum number of steps back of times.
 MAX_STEPS_BACK = 1000
-# Maximum number of blocks between which one was written late.
+# Maximum number of blocks among which a late block belongs.
 MAX_CROSSED = 2
-# Minimum share of samples with the time of the one before, from which times are rounded.
+# Minimum share and number of samples with the time of the one before, if times are rounded.
 MIN_ROUNDED = 0.1
 MIN_ROUNDED_COUNT = 10
 SIDES: tuple[Literal["left"], Literal["right"]] = ("left", "right")
-# Rows and gaps that are named.
+# Maximum number of rows and gaps in a note.
 NAMED = 5
 
 
 @dataclass(frozen=True)
 class Order:
-    """Samples in the order of their times.
-
-    Attributes
-    ----------
-    rows
-        Indices of the samples that are used, in their order.
-    time
-        Their times [s].
-    notes
-        The result.
-    """
+    """Indices of the used samples in the order of their times [s], and notes about them."""
 
     rows: Numbers
     time: Array
@@ -60,31 +50,12 @@ class Order:
 def in_order(
     path: Path, time: Array, values: Array, lines: Numbers, part: int | None, row: str
 ) -> Order:
-    """Put samples into the order of their times.
+    """Put samples into the order of their times [s].
 
-    Rows that were written twice are used once; blocks that were written late are put where they
-    belong; single rows whose time is out of order are left out. A clock that starts again makes
-    parts, of which one is used.
-
-    Parameters
-    ----------
-    path
-        The file, for messages.
-    time
-        Times in the order of the file [s], shape (samples,).
-    values
-        Everything else that is used, shape (quantities, samples).
-    lines
-        Lines of the samples.
-    part
-        The part that is used, from 1; by default the longest.
-    row
-        Word for a line.
-
-    Raises
-    ------
-    FileError
-        If times go back all the time, or there is no such part.
+    Rows that were written twice, with the same values of shape (quantities, samples), are used
+    once; blocks that were written late are put where they belong; single rows whose time is out of
+    order are left out. A clock that starts again makes parts, of which one is used: the given part,
+    from 1, or the longest. In messages, ``row`` is the word for a line.
     """
     notes: list[str] = []
     rows = np.arange(len(time))
@@ -117,7 +88,6 @@ def _without_odd(time: Array, rows: Numbers, lines: Numbers, notes: list[str], r
             odd.append(at)
     if not odd:
         return rows
-    # A longer run of them is a block.
     chosen = np.unique(odd)
     named = lines[rows[chosen]].tolist()
     notes.append(f"{row} {listed(named, NAMED)}: the time is out of order, left out")
@@ -134,7 +104,7 @@ def _without_repeated(
 ) -> Numbers:
     """Leave out rows that repeat earlier ones in time and values."""
     every = np.ascontiguousarray(np.vstack([time, values])[:, rows].T) + 0.0
-    # A missing number is like another one.
+    # Missing numbers are equal to each other.
     every[np.isnan(every)] = np.inf
     view = every.view([("", every.dtype)] * every.shape[1]).ravel()
     _, first = np.unique(view, return_index=True)
@@ -159,7 +129,7 @@ def _one_part(
     part: int | None,
     row: str,
 ) -> Numbers:
-    """Put blocks in order; of a clock that starts again use one part."""
+    """Put blocks in order, and choose a part if the clock starts again."""
     runs = _runs(time, rows)
     parts: list[list[Numbers]] = [[runs[0]]]
     for run in runs[1:]:
@@ -177,8 +147,8 @@ def _one_part(
     chosen = part - 1 if part is not None else int(np.argmax([len(one) for one in whole]))
     if len(whole) > 1:
         shown = "; ".join(
-            f"{number_} {row}s {lines[one].min()} to {lines[one].max()}"
-            for number_, one in enumerate(whole[:NAMED], 1)
+            f"{position} {row}s {lines[one].min()} to {lines[one].max()}"
+            for position, one in enumerate(whole[:NAMED], 1)
         )
         notes.append(
             f"the clock starts again: {len(whole)} parts ({shown}); part {chosen + 1} is used, "
@@ -198,7 +168,7 @@ def _fits(time: Array, runs: Sequence[Numbers], run: Numbers) -> bool:
 
 
 def _without_equal(time: Array, rows: Numbers, lines: Numbers, notes: list[str], row: str) -> Order:
-    """Handle samples of one time: rounded times are spread evenly, others used once."""
+    """Handle samples with equal times: rounded times are spread evenly, others are used once."""
     times = time[rows]
     same = np.concatenate([[False], np.diff(times) == 0])
     count = int(same.sum())
@@ -230,13 +200,7 @@ def _without_equal(time: Array, rows: Numbers, lines: Numbers, notes: list[str],
 
 
 def sampling_report(time: Array) -> list[str]:
-    """Lines about the rates of samples, from when to when, and about gaps.
-
-    Parameters
-    ----------
-    time
-        Times [s], shape (samples,), increasing.
-    """
+    """Lines about sampling rates, each with its interval of time, and about gaps."""
     steps = np.diff(time)
     usual = _usual(steps)
     is_gap = steps > MIN_GAP * usual
@@ -261,7 +225,7 @@ def sampling_report(time: Array) -> list[str]:
 
 
 def _usual(steps: Array) -> Array:
-    """The usual interval around each one: the smaller of the medians before and after it."""
+    """The median of the intervals around each one."""
     from scipy.ndimage import median_filter
 
     size = min(2 * AROUND + 1, len(steps) - (1 - len(steps) % 2))
@@ -270,7 +234,7 @@ def _usual(steps: Array) -> Array:
 
 
 def _stretches(usual: Array) -> list[tuple[int, int]]:
-    """Stretches of one rate as pairs of samples; short ones belong to the one before."""
+    """First and last sample of each stretch of one rate; short ones belong to the one before."""
     levels = np.round(np.log(usual) / np.log(SAME_RATE))
     edges = [0, *(np.flatnonzero(np.abs(np.diff(levels)) > 1) + 1).tolist(), len(usual)]
     found: list[tuple[int, int]] = []

@@ -19,18 +19,16 @@ from mesoslip.analysis.sampled_slips import FoundSlips, find_slips
 from mesoslip.configuration.config import Config
 from mesoslip.configuration.reading import PathLike, as_path
 from mesoslip.errors import ConfigError, Problem
-from mesoslip.measured.assembly import read_record
-from mesoslip.measured.catalogue import count_group, noise_group, slip_group
 from mesoslip.measured.description import (
     Experiment,
     TraceDescription,
     config_of_file,
     describe,
     option_name,
-    resolve,
 )
-from mesoslip.measured.load_point import drive_stages, stage_table
-from mesoslip.measured.record import Record, RecordedColumn
+from mesoslip.measured.load_point import drive_stages
+from mesoslip.measured.measured_record import Record, RecordedColumn, read_record, resolve
+from mesoslip.measured.output_groups import count_group, noise_group, slip_group, stage_group
 from mesoslip.output import variables
 from mesoslip.output.inputs import ConfigLike
 from mesoslip.output.provenance import program_attributes
@@ -64,31 +62,20 @@ class PartialConfig:
 
 @dataclass(frozen=True)
 class Understood:
-    """A file as it was understood, before anything is computed from it.
-
-    Attributes
-    ----------
-    record
-        Samples and columns.
-    experiment
-        The description, with what was found in the file.
-    config
-        Configuration of a model, if there is one.
-    stiffness
-        Spring constant, in the unit of the force over metre; None if unknown.
-    path
-        The file of the measurement.
-    """
+    """The interpretation of a file, before anything is computed from it."""
 
     record: Record
     experiment: Experiment
+    """The description, with the columns that were found in the file."""
     config: Config | None
+    """Configuration of a model."""
     stiffness: float | None
+    """Spring constant, in the unit of the force over metre."""
     path: Path
 
     @cached_property
     def noise(self) -> TraceNoise | float:
-        """The noise of the force: estimated, or its standard deviation as it is given."""
+        """The noise of the force: estimated, or its given standard deviation."""
         given = self.experiment.trace.si("noise")
         if given is not None:
             return given
@@ -98,7 +85,7 @@ class Understood:
 
     @property
     def report(self) -> list[str]:
-        """Lines about what was understood."""
+        """Lines about the interpretation and the noise."""
         lines = list(self.record.report)
         if isinstance(self.noise, TraceNoise):
             unit = "1" if self.record.is_friction else "N"
@@ -126,13 +113,7 @@ def understand(
 
 
 def _stiffness(record: Record, trace: TraceDescription) -> float | None:
-    """The spring constant in the unit of the force over metre.
-
-    Raises
-    ------
-    ConfigError
-        If it is of the other kind, and no normal force is known.
-    """
+    """The spring constant in the unit of the force over metre."""
     stiffness, normal = trace.si("stiffness"), record.mean_normal_force
     if stiffness is None or not trace.is_in("stiffness", "N/m" if record.is_friction else "1/m"):
         return stiffness
@@ -149,13 +130,7 @@ def _stiffness(record: Record, trace: TraceDescription) -> float | None:
 
 
 def _check_units(record: Record, trace: TraceDescription, model: Config | None) -> None:
-    """Check that noise and model are of the kind of the force.
-
-    Raises
-    ------
-    ConfigError
-        If they are not.
-    """
+    """Check that noise, minimum fall and model suit a force or a friction coefficient."""
     for name in ("noise", "min_fall"):
         if record.is_friction and trace.is_in(name, "N"):
             message = "the file has friction coefficients: expected a number such as 0.001"
@@ -212,7 +187,7 @@ def read_trace(
     start, end
         Times of the file from which, and until which, samples are used [s].
     hum
-        Frequency of a hum to take off [1/s].
+        Frequency of a hum that is removed [1/s].
     trend
         "none" or "linear": trend of the friction with displacement, for rates and states.
     config
@@ -234,7 +209,7 @@ def read_trace(
         The layout of a run's output. Attribute ``origin`` is "measured"; ``trace`` repeats the
         reading. Root: ``spring_force`` [N] or ``friction_coefficient``, dimensions (realization,
         time) at any increasing times, and displacements and velocity as far as they are known.
-        Groups: ``slips``; ``recorded`` with the columns of the file as they were.
+        Groups: ``slips``; ``recorded`` with the columns of the file as it has them.
 
     Raises
     ------
@@ -268,7 +243,7 @@ def read_trace(
 
 
 def trace_of(understood: Understood) -> xr.DataTree:
-    """The output of a file that was understood; see `read_trace`."""
+    """The output of the interpretation of a file; see `read_trace`."""
     record, trace = understood.record, understood.experiment.trace
     title = understood.experiment.title or f"Measured: {understood.path.name}"
     velocity, stiffness = trace.si("velocity"), understood.stiffness
@@ -338,9 +313,9 @@ def _comments(force: Array, noise: float, period: float) -> Iterator[str]:
 
 
 def _as_measured(config: Config, record: Record, title: str) -> Config:
-    """The configuration of an experiment with the duration and sampling interval of its trace."""
+    """The configuration with the duration and sampling interval of the trace."""
     time = record.time
-    # Rounded, as differences of times have rounding errors.
+    # Differences of times have rounding errors.
     duration, interval = (
         float(f"{one:.9g}") for one in (time[-1] - time[0], np.median(np.diff(time)))
     )
@@ -363,7 +338,7 @@ def _drive(
     time = record.time - record.time[0]
     start = 0.0
     if stiffness is not None and 0 < stiffness < math.inf:
-        # The slider starts at 0.
+        # The slider starts at displacement 0.
         start = record.force[0] / stiffness
     if config is not None and config.drive.force_rate is None:
         velocity = first_velocity(config)
@@ -398,7 +373,7 @@ def _drive_displacement(config: Config, time: Array) -> Array:
 def _displacement(
     record: Record, force: Array, drive: Array | None, stiffness: float | None
 ) -> Array | None:
-    """Displacement of the slider [m]: recorded, or from the stretch of the spring; or unknown."""
+    """Displacement of the slider [m], recorded or from the stretch of the spring, if known."""
     if record.displacement is not None:
         return record.displacement
     if drive is None or stiffness is None or not 0 < stiffness < math.inf:
@@ -450,12 +425,12 @@ def _tree(
         groups["/noise"] = noise_group(understood.noise, unit)
     if record.load_point is not None and understood.config is None:
         known = np.isfinite(record.load_point)
-        groups["/stages"] = stage_table(drive_stages(record.time[known], record.load_point[known]))
+        groups["/stages"] = stage_group(drive_stages(record.time[known], record.load_point[known]))
     return xr.DataTree.from_dict(groups)
 
 
 def _names(record: Record) -> dict[str, RecordedColumn]:
-    """Columns of the file by names that netCDF takes, each once."""
+    """Columns of the file by unique names that are valid in netCDF."""
     found: dict[str, RecordedColumn] = {}
     for number, one in enumerate(record.columns, 1):
         name = re.sub(r"\W+", "_", one.header, flags=re.ASCII).strip("_")

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from mesoslip.configuration.units import NUMBER, to_si
 
-# Words for units, without case, and how the program writes them.
+# Words for units, in lower case, and the program's names.
 WORDS = {
     "sec": "s", "secs": "s", "second": "s", "seconds": "s", "sek": "s",
     "msec": "ms", "msecs": "ms", "millisec": "ms", "millisecond": "ms", "milliseconds": "ms",
@@ -27,18 +27,18 @@ WORDS = {
     "volt": "V", "volts": "V", "millivolt": "mV", "millivolts": "mV",
     "hertz": "Hz", "percent": "%",
 }  # fmt: skip
-# Symbols: here case matters, but for those that nobody else has.
+# Symbols, whose case matters, except those without another meaning.
 SYMBOL = re.compile(r"(?P<prefix>[fpnumckMG]?)(?P<unit>m|s|N|Pa|V|Hz)")
-# Units of quotients, such as "um/s", "N/mm^2".
+# Factors of units such as "um/s", "N/mm^2".
 POWER = re.compile(r"(?P<name>[A-Za-z]+)(?:\^|\*\*)?(?P<power>-?[1-9])?")
 CASELESS = {"mpa": "MPa", "kpa": "kPa", "gpa": "GPa", "pa": "Pa", "n": "N", "kn": "kN"} | {
     "mv": "mV", "v": "V", "hz": "Hz", "khz": "kHz", "s": "s", "ms": "ms", "us": "us",
     "um": "um", "nm": "nm", "cm": "cm", "mm": "mm", "m": "m", "un": "uN",
 }  # fmt: skip
-# Nothing but a number.
+# Units of plain numbers.
 NONE = {"", "1", "-", "none", "dimensionless", "unitless", "a.u."}
 
-# Masses that stand for their weight, in newton, and other units with their size in SI.
+# Units with their size in SI.
 GRAVITY = 9.80665
 SIZES = {
     "kgf": (GRAVITY, "N"),
@@ -55,9 +55,9 @@ SIZES = {
     "mV": (1e-3, "V"),
     "uV": (1e-6, "V"),
 }
-# Masses as units of forces, a guess that is reported.
+# Masses as units of forces, a guess that is reported [N].
 WEIGHTS = {"kg": GRAVITY, "g": 1e-3 * GRAVITY, "mg": 1e-6 * GRAVITY, "t": 1e3 * GRAVITY}
-# Bytes of a Greek letter read in another encoding, or lost.
+# A micro sign, also if it was read in another encoding, or lost.
 MICRO = re.compile(r"Âµ|Î¼|µ|μ|\ufffd(?=m\b|s\b|N\b)|\?(?=m\b|s\b|N\b)|\\mu\s*|&micro;")
 BRACKETED = re.compile(r"\[(.*)\]|\((.*)\)|\{(.*)\}|<(.*)>")
 SUPERSCRIPTS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
@@ -71,13 +71,13 @@ class Size(NamedTuple):
 
 
 def plain(text: str) -> str:
-    """A unit with u for µ, whatever its encoding, and without superscripts."""
+    """A unit with u for µ and digits for superscripts."""
     return MICRO.sub("u", text).translate(SUPERSCRIPTS).strip()
 
 
 @cache
 def unit_named(text: str) -> str | None:
-    """The program's name of a unit; "1" for none, and None if the text is not a unit."""
+    """The program's name of a unit, "1" for plain numbers; None if the text is not a unit."""
     text = plain(text)
     bracketed = BRACKETED.fullmatch(text)
     text = (bracketed[bracketed.lastindex or 1] if bracketed else text).strip(" .")
@@ -108,22 +108,19 @@ def _quotient(text: str) -> str | None:
 
 
 def is_unit(text: str) -> bool:
-    """Whether a text is a unit other than none."""
+    """Whether a text is a unit other than that of plain numbers."""
     return unit_named(text) not in {None, "1"}
 
 
 @cache
 def size_of(text: str, unit: str) -> Size | None:
-    """Size of a unit in an SI unit ("V" for voltages); None if it is not of that dimension.
+    """Size of a unit in an SI unit, or in volts; None if it is of another dimension.
 
-    Raises
-    ------
-    ValueError
-        If the text is not a unit.
+    A ValueError if the text is not a unit.
     """
     name = unit_named(text)
     if name is None:
-        # Units that nobody writes into headers, such as furlongs, are pint's.
+        # Rare units, such as furlongs, are known to pint.
         return _by_pint(plain(text), unit)
     if name in SIZES:
         size, dimension = SIZES[name]

@@ -17,8 +17,7 @@ from mesoslip.measured.reading.table import Table, listed
 from mesoslip.output.hdf5 import LOCK
 
 HDF5 = b"\x89HDF\r\n\x1a\n"
-# Maximum number of arrays of a file that are looked at, of structures in each other, and of columns
-# of an array.
+# Maximum number of arrays in a file, depth of structures, and number of columns of an array.
 MAX_ARRAYS = 10_000
 MAX_DEPTH = 20
 MAX_COLUMNS = 200
@@ -40,7 +39,7 @@ def _read(kind: str, path: Path, data: bytes, arrays: Callable[[bytes], Iterator
             found = list(arrays(data))
     except FileError as error:
         raise FileError(f"{path}: {error}") from None
-    # Libraries report a damaged file by errors of all kinds.
+    # Libraries raise errors of any type for a damaged file.
     except Exception as error:
         raise FileError(f"{path}: a damaged file of {kind}: {error}") from None
     return _table(kind, path, found)
@@ -84,7 +83,6 @@ def _table(kind: str, path: Path, found: list[Found]) -> Table:
         values,
         np.arange(1, length + 1),
         {},
-        any(one.name for one in columns),
         False,
         notes,
     )
@@ -96,7 +94,7 @@ def _described(values: Any) -> str:
 
 
 def _headers(columns: list[Found]) -> tuple[str, ...]:
-    """Names without those of their groups, where they are unique; known longer names otherwise."""
+    """Names, without groups if they are unique; long names if only these have a meaning."""
     short = [one.name.rpartition("/")[2] for one in columns]
     counts = Counter(short)
     headers = []
@@ -146,7 +144,7 @@ def _fields(name: str, value: Any, depth: int) -> Iterator[Found]:
 
 
 def _hdf5(data: bytes) -> Iterator[Found]:
-    """Data sets of groups; what is linked to, in other files or virtual is not read."""
+    """Data sets of groups, except links, and data in other files."""
     import h5py
 
     with h5py.File(BytesIO(data), "r") as file:
@@ -190,7 +188,7 @@ def _data_set(name: str, one: Any) -> Iterator[Found]:
 
 
 def _unpacked(name: str, values: Any, attributes: Mapping[str, Any]) -> Found:
-    """Numbers as attributes of CF have them packed and missing."""
+    """Numbers unpacked and missing according to the attributes of CF."""
     numbers = np.asarray(values, dtype=float)
     for key in ("_FillValue", "missing_value"):
         if key in attributes:

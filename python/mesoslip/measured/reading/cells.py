@@ -1,4 +1,4 @@
-"""Cells of a text: which are numbers, and which stand for missing ones."""
+"""Cells of a text: numbers, and entries for missing ones."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import re
 from mesoslip.configuration.columns import IGNORED
 from mesoslip.configuration.units import GROUPED, number_of
 
-# Digits are 0 to 9 alone; nothing groups them.
+# Numbers with digits 0 to 9 that are not grouped.
 POINTED = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 WITH_COMMA = re.compile(r"[+-]?(?:[0-9]+(?:,[0-9]*)?|,[0-9]+)(?:[eE][+-]?[0-9]+)?")
 NUMBERS = {".": POINTED, ",": WITH_COMMA}
@@ -27,13 +27,7 @@ DELIMITERS = ("\t", ";", "|", ",", " ")
 
 
 def split(line: str, delimiter: str) -> list[str]:
-    """Cells of a line, without the blanks around them.
-
-    Raises
-    ------
-    ValueError
-        If quotes are not closed.
-    """
+    """Cells of a line, without the blanks around them; a ValueError if quotes are not closed."""
     if delimiter == " ":
         return line.split()
     if '"' not in line:
@@ -51,12 +45,12 @@ def is_number(cell: str, decimal: str) -> bool:
 
 
 def is_missing(cell: str) -> bool:
-    """Whether a cell says that there is no number."""
+    """Whether a cell stands for a missing number."""
     return cell.lower() in MISSING or cell == IGNORED
 
 
 def hint_for(cell: str, decimal: str) -> str:
-    """The fix for a cell that is not a number; empty if that is unknown."""
+    """The fix for a cell that is not a number; empty if it is unknown."""
     try:
         number_of(cell, decimal)
     except ValueError as error:

@@ -1,4 +1,4 @@
-"""Files of any kind as tables."""
+"""Read files of any kind as tables."""
 
 from __future__ import annotations
 
@@ -12,21 +12,10 @@ from mesoslip.measured.reading.text import read_text
 
 
 def read_file(path: Path, *, decimal: str | None = None, has_headers: bool = False) -> Table:
-    """Read a file of a measurement.
+    """Read a file of text, which may be compressed, MATLAB, HDF5, netCDF or NumPy.
 
-    Parameters
-    ----------
-    path
-        Text, MATLAB, HDF5, netCDF or .npz; text may be compressed.
-    decimal
-        Decimal sign of a text; by default found from its numbers.
-    has_headers
-        Whether columns are described otherwise than by headers of the file.
-
-    Raises
-    ------
-    FileError
-        If it cannot be read, or has no table.
+    By default the decimal sign of a text is found from its numbers. ``has_headers`` is whether
+    there are other headers than those of the file.
     """
     data = bytes_of(path)
     for start, read in READERS:

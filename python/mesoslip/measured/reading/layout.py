@@ -6,7 +6,7 @@ import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -23,11 +23,11 @@ from mesoslip.measured.reading.cells import (
 )
 from mesoslip.measured.units import is_unit
 
-# Lines that are looked at to find the layout.
+# Number of lines from which the layout is found.
 SAMPLE = 200
 # Score of a header with the same delimiter.
 HEADER_SCORE = 0.2
-# Lines above the numbers in which a header is looked for.
+# Maximum number of lines from the header to the numbers.
 MAX_HEADER_LINES = 200
 # Minimum share of the lines, and of the cells, that fit a layout.
 MIN_SCORE = 0.3
@@ -38,34 +38,19 @@ MARKERS = "#%/!*;'\" \t"
 
 @dataclass(frozen=True)
 class Layout:
-    """How a text has its numbers.
-
-    Attributes
-    ----------
-    delimiter
-        Separator of cells; a space stands for any number of blanks.
-    decimal
-        Decimal sign.
-    count
-        Cells of a row.
-    first
-        Index of the first line below the header, from 0.
-    headers, units
-        Cells of the header and of a line of units below it; None without one.
-    is_numeric
-        Of each column, whether it has numbers.
-    notes
-        Lines about them.
-    """
+    """The layout of a table in a text."""
 
     delimiter: str
+    """Separator of cells; a space stands for any number of blanks."""
     decimal: str
+    """Decimal sign."""
     count: int
+    """Number of cells in a row."""
     first: int
+    """Index of the first line below the header."""
     headers: tuple[str, ...] | None
     units: tuple[str, ...] | None
-    is_numeric: tuple[bool, ...]
-    notes: list[str] = field(default_factory=list)
+    """Cells of a line of units below the header."""
 
 
 @dataclass(frozen=True)
@@ -77,29 +62,13 @@ class _Guess:
     delimiter: str
     decimal: str
     is_numeric: tuple[bool, ...]
+    """Whether each column has numbers."""
 
 
 def find_layout(
     path: Path, lines: Sequence[str], decimal: str | None, *, has_headers: bool = False
 ) -> Layout:
-    """Find the layout of a text.
-
-    Parameters
-    ----------
-    path
-        The file, for messages.
-    lines
-        All lines.
-    decimal
-        Decimal sign, if it is known.
-    has_headers
-        Whether there are other headers than those of the file.
-
-    Raises
-    ------
-    FileError
-        If it has no table of numbers, or no header that fits it.
-    """
+    """Find the layout of a text; see `mesoslip.measured.reading.file.read_file`."""
     number = next((one for one, line in enumerate(lines) if line.strip()), None)
     if number is None:
         raise FileError(f"{path}: is empty; expected columns with units, such as 'time [s]'")
@@ -113,13 +82,9 @@ def find_layout(
     found = _header(lines, data, guess)
     if found is None and not has_headers:
         _refuse_header(path, lines, data, guess)
-    if found is None:
-        # Lines above the numbers are left out with a note, except damaged rows.
-        return Layout(guess.delimiter, guess.decimal, guess.count, 0, None, None, guess.is_numeric)
-    first, headers, units = found
-    return Layout(
-        guess.delimiter, guess.decimal, guess.count, first, headers, units, guess.is_numeric
-    )
+    # Without a header, lines above the numbers are left out with a note, except damaged rows.
+    first, headers, units = found or (0, None, None)
+    return Layout(guess.delimiter, guess.decimal, guess.count, first, headers, units)
 
 
 def _refuse_header(path: Path, lines: Sequence[str], data: int, guess: _Guess) -> None:
@@ -142,7 +107,7 @@ def _refuse_header(path: Path, lines: Sequence[str], data: int, guess: _Guess) -
 
 
 def _sampled(lines: Sequence[str]) -> list[str]:
-    """Lines from all of a text but its beginning, without comments and empty ones."""
+    """Lines from all parts of a text except its beginning, without comments and empty lines."""
     start = min(len(lines) // 5, MAX_HEADER_LINES)
     picked = np.unique(np.linspace(start, len(lines) - 1, SAMPLE).astype(int))
     chosen = [lines[one] for one in picked]
@@ -160,7 +125,7 @@ def _best_guess(lines: Sequence[str], decimal: str | None) -> _Guess | None:
         if (delimiter, sign) != (",", ",") and sign == (decimal or sign)
         for guess in _guess(sample, delimiter, sign)
     ]
-    # A quoted number may have a decimal comma between commas.
+    # Quoted numbers may have decimal commas in a file with commas between cells.
     if decimal != "." and any('"' in line for line in sample):
         guesses += _guess(sample, ",", ",")
     guesses = [one for one in guesses if one.score >= MIN_SCORE]
@@ -188,7 +153,7 @@ def _fits_header(lines: Sequence[str], guess: _Guess) -> bool:
 
 
 def _guess(sample: Sequence[str], delimiter: str, decimal: str) -> Iterator[_Guess]:
-    """How well a delimiter and a decimal sign fit, if they do at all."""
+    """How well a delimiter and a decimal sign fit, unless there are no numbers."""
     rows = []
     for line in sample:
         try:
@@ -205,7 +170,7 @@ def _guess(sample: Sequence[str], delimiter: str, decimal: str) -> Iterator[_Gue
     if not numbers.any():
         return
     fits = numbers | missing
-    # A column may be of words, such as states of a machine.
+    # A column may have words, such as states of a machine.
     is_numeric = fits.mean(axis=0) > 0.5
     is_numeric &= numbers.any(axis=0) | ~missing.all(axis=0)
     score = times / len(sample) * float(fits.mean())
@@ -237,7 +202,7 @@ def _first_row(lines: Sequence[str], guess: _Guess) -> int:
 def _header(
     lines: Sequence[str], data: int, guess: _Guess
 ) -> tuple[int, tuple[str, ...], tuple[str, ...] | None] | None:
-    """The line below the header, the header, and units below it: the last that fit above a row."""
+    """The index of the line below the header, the header nearest to the numbers, and its units."""
     above = [
         one
         for one in range(data - 1, max(-1, data - 1 - MAX_HEADER_LINES), -1)
@@ -265,9 +230,9 @@ def _are_units(cells: Sequence[str]) -> bool:
 
 
 def header_cells(line: str, delimiter: str, decimal: str, count: int) -> tuple[str, ...] | None:
-    """Cells of a line as a header of as many columns; None if it is not one.
+    """Cells of a line as a header of a number of columns; None if it is not one.
 
-    Headers may be comments, and be delimited otherwise than the numbers.
+    Headers may be comments, and have another delimiter than the numbers.
     """
     bare = line.lstrip(MARKERS) if COMMENT.match(line) else line.lstrip(" ")
     for cells in _splittings(bare, delimiter):
@@ -284,7 +249,7 @@ def header_cells(line: str, delimiter: str, decimal: str, count: int) -> tuple[s
 
 
 def _splittings(line: str, delimiter: str) -> Iterator[list[str]]:
-    """Ways to divide a header into cells: one only, where something divides it."""
+    """Divisions of a header into cells; a single one if it has a delimiter."""
     if delimiter.strip(" ") and delimiter in line:
         with suppress(ValueError):
             yield split(line, delimiter)
@@ -294,7 +259,7 @@ def _splittings(line: str, delimiter: str) -> Iterator[list[str]]:
     words = [cell.strip(" ,;") for cell in WORD.findall(line)]
     if len(wide) > 1:
         yield wide
-        # Names of one word each may stand apart by one blank or more.
+        # There may be one blank or more between names of one word.
         if all(read_header(one).quantity or BRACKETS.search(one) for one in words):
             yield words
         return
@@ -307,13 +272,7 @@ def _splittings(line: str, delimiter: str) -> Iterator[list[str]]:
 
 
 def check_decimal_comma(path: Path, lines: Sequence[str], layout: Layout) -> None:
-    """Check that commas in numbers are decimal: that one at least cannot group digits.
-
-    Raises
-    ------
-    FileError
-        If none shows that; the message names a line and a column.
-    """
+    """Check that commas in numbers are decimal: at least one of them cannot group digits."""
     example = None
     for number, line in enumerate(lines[layout.first :], layout.first + 1):
         if "," not in line:

@@ -15,14 +15,14 @@ from typing import IO, Any
 from mesoslip.configuration.reading import is_directory, is_file
 from mesoslip.errors import FileError, shown
 
-# Maximum size of a file, and of what a compressed one becomes [bytes].
+# Maximum size of a file, compressed or not [bytes].
 MAX_BYTES = 2**31
-# Bytes that are examined to distinguish encodings.
+# Bytes from which the encoding is determined.
 HEAD = 4096
 # Maximum share of null characters in a damaged text.
 MAX_NULLS = 0.01
 
-# Compressions: their first bytes, and what opens them.
+# Compressions: their first bytes, and their readers.
 COMPRESSIONS: dict[str, tuple[bytes, Callable[[IO[bytes]], Any]]] = {
     "gzip": (b"\x1f\x8b", lambda file: gzip.GzipFile(fileobj=file)),
     "bzip2": (b"BZh", bz2.BZ2File),
@@ -31,13 +31,7 @@ COMPRESSIONS: dict[str, tuple[bytes, Callable[[IO[bytes]], Any]]] = {
 
 
 def bytes_of(path: Path) -> bytes:
-    """The bytes of a file, decompressed.
-
-    Raises
-    ------
-    FileError
-        If it cannot be read, or is too large.
-    """
+    """The bytes of a file, decompressed."""
     try:
         if is_directory(path):
             raise FileError(f"{path}: is a directory, not a file of a measurement")
@@ -104,11 +98,6 @@ def text_of(path: Path, data: bytes) -> str:
     """The text of a file: UTF-8, UTF-16 or an encoding of Western Europe.
 
     Line breaks are `\\n`, and minus signs hyphens.
-
-    Raises
-    ------
-    FileError
-        If it is not text.
     """
     text = _decoded(data)
     if text is not None and 0 < text.count("\0") < MAX_NULLS * len(text):

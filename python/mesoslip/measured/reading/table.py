@@ -1,9 +1,9 @@
-"""A table of numbers as a file has it, before anything is known of its columns."""
+"""A table of numbers as in a file."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 
 
 class BadCell(NamedTuple):
-    """A cell that is not a number: its line, its text, and why or what would be right."""
+    """A cell that is not a number: its line, its text, and the reason or the fix."""
 
     line: int
     text: str
@@ -23,39 +23,21 @@ class BadCell(NamedTuple):
 
 @dataclass(frozen=True)
 class Table:
-    """Columns of numbers.
-
-    Attributes
-    ----------
-    path
-        The file.
-    headers
-        Headers of the columns; empty texts without one.
-    units
-        Units from a line of their own or from attributes; empty texts without one.
-    values
-        Numbers, shape (columns, rows); NaN where one is missing or is not a number.
-    lines
-        Number of the line of each row, from 1; in files that are not text its number.
-    bad
-        Cells that are not numbers, by column.
-    has_header
-        Whether the file has headers.
-    is_text
-        Whether it is a text file.
-    notes
-        Lines about what was found and what was left out.
-    """
+    """Columns of numbers."""
 
     path: Path
     headers: tuple[str, ...]
     units: tuple[str, ...]
+    """Units from a line of their own or from attributes; may be empty, as headers may."""
     values: Array
+    """Numbers, shape (columns, rows); NaN for missing ones and for cells that are not numbers."""
     lines: NDArray[np.int_]
+    """Line of each row, from 1; number of the row in a file that is not text."""
     bad: dict[int, list[BadCell]]
-    has_header: bool
+    """Cells that are not numbers, by column."""
     is_text: bool
-    notes: Sequence[str] = field(default=())
+    notes: Sequence[str]
+    """Lines about the file."""
 
     @property
     def row(self) -> str:

@@ -1,6 +1,6 @@
 """Tables of text. Regular rows are read by pandas, all others cell by cell; no number is guessed.
 
-A row is regular if it has the usual number of cells and no characters but those of numbers.
+A row is regular if it has the usual number of cells and only characters of numbers.
 """
 
 from __future__ import annotations
@@ -16,26 +16,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip.errors import FileError, shown
-from mesoslip.measured.reading.cells import (
-    COMMENT,
-    hint_for,
-    is_missing,
-    is_number,
-    split,
-)
-from mesoslip.measured.reading.layout import (
-    Layout,
-    check_decimal_comma,
-    find_layout,
-    header_cells,
-)
+from mesoslip.measured.reading.cells import COMMENT, hint_for, is_missing, is_number, split
+from mesoslip.measured.reading.layout import Layout, check_decimal_comma, find_layout, header_cells
 from mesoslip.measured.reading.table import Array, BadCell, Table, listed
 
 # Maximum share of rows with fewer cells than others.
 MAX_SHORT = 0.05
-# Rows before the last one with which its digits are compared.
+# Number of rows before the last one with which its digits are compared.
 COMPARED = 20
-# Maximum share of rows with fewer decimal points than others that are worth a note.
+# Maximum share of rows with fewer decimal points than others that are reported.
 MAX_ODD = 1e-3
 POINT = "; numbers have a decimal point, and a comma would begin another cell"
 
@@ -45,24 +34,7 @@ Numbers = NDArray[np.int_]
 def read_text(
     path: Path, text: str, *, decimal: str | None = None, has_headers: bool = False
 ) -> Table:
-    """Read a text.
-
-    Parameters
-    ----------
-    path
-        The file, for messages.
-    text
-        Its text.
-    decimal
-        Decimal sign; by default found from the numbers.
-    has_headers
-        Whether there are other headers than those of the file.
-
-    Raises
-    ------
-    FileError
-        If it has no table, or a row has more cells than others.
-    """
+    """Read a text; see `mesoslip.measured.reading.file.read_file`."""
     lines = text.split("\n")
     layout = find_layout(path, lines, decimal, has_headers=has_headers)
     if layout.delimiter != "," and layout.decimal == "," and decimal is None:
@@ -77,7 +49,6 @@ def read_text(
         values,
         numbers,
         body.bad,
-        layout.headers is not None,
         True,
         [*_layout_notes(layout), *body.notes()],
     )
@@ -94,7 +65,7 @@ def _layout_notes(layout: Layout) -> list[str]:
 
 @dataclass
 class _Body:
-    """The rows of a text, and what is found in them."""
+    """The rows of a text, and numbers of notable lines."""
 
     path: Path
     lines: Sequence[str]
@@ -113,7 +84,7 @@ class _Body:
     def read(self) -> tuple[Array, Numbers]:
         """Numbers, shape (columns, rows), and the line of each row."""
         layout = self.layout
-        # Lines above the numbers may come again.
+        # Lines above the numbers may be repeated.
         self.above = {line.strip() for line in self.lines[: layout.first]}
         data = np.frombuffer("\n".join(self.lines[layout.first :]).encode() + b"\n", np.uint8)
         ends = np.flatnonzero(data == ord("\n"))
@@ -203,13 +174,13 @@ class _Body:
         return values
 
     def _slow(self, indices: Numbers) -> Array:
-        """Numbers of lines that are regular but for a cell, such as "1-5"."""
+        """Numbers of regular lines in which a cell, such as "1-5", is not a number."""
         rows = [self._cells(int(one) + self.layout.first) for one in indices]
         none = [math.nan] * self.layout.count
         return np.array([none if row is None else row for row in rows]).T
 
     def _cells(self, index: int) -> list[float] | None:
-        """Numbers of one line; None if it is not a row. What is wrong is recorded."""
+        """Numbers of one line; None if it is not a row."""
         line, number, layout = self.lines[index], index + 1, self.layout
         if not line.strip():
             return None
@@ -297,7 +268,7 @@ class _Body:
             self.cut = int(rows[-1]) + layout.first + 1
 
     def notes(self) -> list[str]:
-        """Lines about what was found in the rows."""
+        """Lines about the rows."""
         found = [
             (self.comments, "comments"),
             (self.restarts, "the header again, as of an instrument that restarts"),

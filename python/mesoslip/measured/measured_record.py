@@ -2,24 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from mesoslip.errors import FileError, shown
-from mesoslip.measured.columns import Assignment, Used, assign, sentinels, values_of
-from mesoslip.measured.description import TraceDescription
+from mesoslip.measured.columns import FORCES, Assignment, Used, assign, sentinels, values_of
+from mesoslip.measured.description import Column, TraceDescription
 from mesoslip.measured.headers import QUANTITIES, name_of
 from mesoslip.measured.reading.file import read_file
 from mesoslip.measured.reading.table import Array, Table, listed
-from mesoslip.measured.record import Record, RecordedColumn
 from mesoslip.measured.sampling import in_order, sampling_report
 from mesoslip.quantities import number, with_unit
 
 MIN_SAMPLES = 4
-# Quantities that may be forces, in order of preference.
-FORCES = ("force", "shear_stress", "friction")
+# Quantities that a record keeps beside time and force.
+OTHERS = ("load_point", "displacement", "normal_force", "normal_stress")
 WORDS = {
     "load_point": "load point",
     "displacement": "slider displacement",
@@ -29,23 +30,48 @@ WORDS = {
 }
 
 
+@dataclass(frozen=True)
+class RecordedColumn:
+    """A column of the file as it is: its header, its unit as written, its numbers."""
+
+    header: str
+    unit: str
+    values: Array
+    use: str
+    """The quantity that the column was taken for; empty if none."""
+    reference: str
+    """Unique name of the column, or its number from 1."""
+
+
+@dataclass(frozen=True)
+class Record:
+    """Samples in SI at increasing times, each array of shape (samples,)."""
+
+    time: Array
+    force: Array
+    """Force of the spring, or friction coefficient."""
+    is_friction: bool
+    mean_normal_force: float | None
+    """Mean normal force, recorded or given."""
+    load_point: Array | None
+    """Displacement of the drive; NaN for missing samples, as in the next three."""
+    displacement: Array | None
+    """Displacement of the slider."""
+    normal_force: Array | None
+    normal_stress: Array | None
+    columns: Sequence[RecordedColumn]
+    """All columns of numbers of the file, with the rows that are not used."""
+    report: Sequence[str]
+    """Lines about the interpretation of the file."""
+
+    @property
+    def force_name(self) -> str:
+        """Name of the force in outputs."""
+        return "friction_coefficient" if self.is_friction else "spring_force"
+
+
 def read_record(path: Path, trace: TraceDescription) -> Record:
-    """Read the file of a measurement.
-
-    Parameters
-    ----------
-    path
-        The file.
-    trace
-        Properties that the file does not contain.
-
-    Raises
-    ------
-    FileError
-        If it cannot be read or understood; the message names line and column.
-    ConfigError
-        If the description does not fit the file.
-    """
+    """Read the file of a measurement; ``trace`` has the properties that it does not contain."""
     table = read_file(
         path,
         decimal=trace.decimal,
@@ -87,7 +113,7 @@ def read_record(path: Path, trace: TraceDescription) -> Record:
         raise FileError(f"{path}: has {len(order.rows)} samples whose times increase")
     picked = rows[order.rows]
     notes += order.notes
-    for name in ("load_point", "displacement", "normal_force", "normal_stress"):
+    for name in OTHERS:
         if name in values and (count := int(np.isnan(values[name][picked]).sum())):
             notes.append(f"{WORDS[name]}: missing in {count} samples")
     if inside.sum() < len(inside):
@@ -98,11 +124,7 @@ def read_record(path: Path, trace: TraceDescription) -> Record:
         force[picked],
         made.is_friction,
         made.normal,
-        **{
-            name: values[name][picked]
-            for name in ("load_point", "displacement", "normal_force", "normal_stress")
-            if name in values
-        },
+        **{name: values[name][picked] if name in values else None for name in OTHERS},
         columns=[
             _recorded(table, columns, index)
             for index in range(len(table.headers))
@@ -118,25 +140,35 @@ def read_record(path: Path, trace: TraceDescription) -> Record:
     )
 
 
+def resolve(trace: TraceDescription, record: Record) -> TraceDescription:
+    """A description with the columns that were found, so that it repeats the reading."""
+    columns = dict(trace.columns)
+    for one in record.columns:
+        if one.use and columns.get(one.use) is None:
+            columns[one.use] = Column(column=one.reference, unit=one.unit or None)
+    return trace.model_copy(
+        update={"columns": {key: one for key, one in columns.items() if one}, "headers": None}
+    )
+
+
 def _recorded(table: Table, columns: Assignment, index: int) -> RecordedColumn:
     """A column as it is in the file."""
-    header, number_ = table.headers[index], str(index + 1)
+    header, position = table.headers[index], str(index + 1)
     use = next((name for name, one in columns.used.items() if one.index == index), "")
     unit = columns.used[use].unit if use else table.units[index]
-    is_unique = (
-        bool(header.strip()) and [name_of(one) for one in table.headers].count(name_of(header)) == 1
-    )
+    names = [name_of(one) for one in table.headers]
+    is_unique = bool(header.strip()) and names.count(name_of(header)) == 1
     return RecordedColumn(
-        header or f"column {number_}",
+        header or f"column {position}",
         unit,
         table.values[index],
         use,
-        header if is_unique else number_,
+        header if is_unique else position,
     )
 
 
 def _check_needed(table: Table, columns: Assignment, trace: TraceDescription) -> None:
-    """Check that there is a force, or what makes one, and the time."""
+    """Check that the file has the time and a force, stress or coefficient."""
     used, names = columns.used, _described(table, columns)
     rate = trace.si("rate")
     if not set(FORCES) & used.keys():
@@ -158,7 +190,7 @@ def _check_needed(table: Table, columns: Assignment, trace: TraceDescription) ->
 
 
 def _described(table: Table, columns: Assignment) -> str:
-    """The columns of a file, and why they are not used."""
+    """The unused columns of a file, and the reasons."""
     texts = []
     for index, header in enumerate(table.headers):
         if any(one.index == index for one in columns.used.values()):
@@ -178,13 +210,7 @@ class Force(NamedTuple):
 
 
 def _force(values: dict[str, Array], trace: TraceDescription) -> Force:
-    """The force or friction coefficient.
-
-    Raises
-    ------
-    ValueError
-        If a shear stress becomes neither.
-    """
+    """The force or friction coefficient; a ValueError if a shear stress becomes neither."""
     area, given_force, given_stress = (
         trace.si(name) for name in ("area", "normal_force", "normal_stress")
     )
@@ -220,6 +246,7 @@ def _force(values: dict[str, Array], trace: TraceDescription) -> Force:
 
 
 def _check_span(time: Array, trace: TraceDescription) -> None:
+    """Check that start and end are within the record."""
     known = time[np.isfinite(time)]
     if known.size == 0:
         return
@@ -233,7 +260,7 @@ def _check_span(time: Array, trace: TraceDescription) -> None:
 
 
 def _inside(time: Array, trace: TraceDescription) -> np.ndarray[tuple[int], np.dtype[np.bool]]:
-    """Rows between start and end; those without time are where their neighbours are."""
+    """Rows between start and end, and those without a time."""
     start, end = trace.si("start"), trace.si("end")
     inside = np.ones(len(time), dtype=bool)
     if start is not None:

@@ -1,15 +1,17 @@
-"""Groups of a measured output about its noise and its slips."""
+"""Groups of a measured output: slips, noise, stages of the drive."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mesoslip.analysis.apparatus import with_force_unit
 from mesoslip.analysis.noise import TraceNoise
 from mesoslip.analysis.sampled_slips import FoundSlips
+from mesoslip.measured.load_point import DriveStage
 from mesoslip.output import variables
 
 if TYPE_CHECKING:
@@ -19,16 +21,9 @@ if TYPE_CHECKING:
 def slip_group(
     found: FoundSlips, velocity: float | None, stiffness: float | None, unit: str
 ) -> xr.Dataset:
-    """The catalogue of slips.
+    """The catalogue of slips, with peak velocities if drive and stiffness are known.
 
-    Parameters
-    ----------
-    found
-        The slips.
-    velocity, stiffness
-        Of drive [m/s] and spring, as far as known: then slips have a peak velocity.
-    unit
-        Unit of the force, "N" or "1".
+    The unit is that of the force, "N" or "1", here and in the other groups.
     """
     speed = np.full(len(found), np.nan)
     if stiffness is not None and 0 < stiffness < math.inf and velocity is not None:
@@ -51,25 +46,22 @@ def noise_group(noise: TraceNoise, unit: str) -> xr.Dataset:
     """The noise: scalars, the samples of impulses, and lines of hum."""
     import xarray as xr
 
+    hum = {
+        "hum_frequency": np.array([one.frequency for one in noise.hum]),
+        "hum_amplitude": np.array([one.amplitude for one in noise.hum]),
+    }
+    impulses = {"impulse_time": noise.impulse_time}
     return xr.merge(
         [
             _group(variables.NOISE, noise.scalars(), None, unit),
-            _group(variables.NOISE, {"impulse_time": noise.impulse_time}, "impulse", unit),
-            _group(
-                variables.NOISE,
-                {
-                    "hum_frequency": np.array([one.frequency for one in noise.hum]),
-                    "hum_amplitude": np.array([one.amplitude for one in noise.hum]),
-                },
-                "line",
-                unit,
-            ),
+            _group(variables.NOISE, impulses, "impulse", unit),
+            _group(variables.NOISE, hum, "line", unit),
         ]
     )
 
 
 def count_group(found: FoundSlips, unit: str) -> xr.Dataset:
-    """Numbers of slips by minimum fall, with the one that is used."""
+    """Numbers of slips by minimum fall, with the minimum fall of the catalogue."""
     counts = found.counts
     columns = {"min_fall": counts.threshold, "slip_count": counts.count}
     data = _group(variables.SLIP_COUNTS, columns, "threshold", unit)
@@ -77,6 +69,22 @@ def count_group(found: FoundSlips, unit: str) -> xr.Dataset:
     if counts.plateau is not None:
         data.attrs["plateau"] = list(counts.plateau)
     return data
+
+
+def stage_group(stages: Sequence[DriveStage]) -> xr.Dataset:
+    """The stages of the drive."""
+    group = variables.MEASURED_STAGES
+    columns = {
+        "realization_index": [0] * len(stages),
+        "stage_number": list(range(len(stages))),
+        "stage_start_time": [one.start for one in stages],
+        "stage_end_time": [one.end for one in stages],
+        "drive_start_velocity": [one.start_velocity for one in stages],
+        "drive_end_velocity": [one.end_velocity for one in stages],
+        "drive_velocity_error": [one.velocity_error for one in stages],
+    }
+    arrays = {name: np.array(one, dtype=group[name].dtype) for name, one in columns.items()}
+    return _group(group, arrays, "stage", "N")
 
 
 def _group(
@@ -93,7 +101,5 @@ def _group(
         {name: group.variable(name, dimensions, values) for name, values in columns.items()}
     )
     for one in data.data_vars.values():
-        units = one.attrs["units"]
-        if unit == "1" and units.split()[0] == "N":
-            one.attrs["units"] = units.partition(" ")[2] or "1"
+        one.attrs["units"] = with_force_unit(one.attrs["units"], unit)
     return data

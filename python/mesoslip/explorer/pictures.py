@@ -21,9 +21,9 @@ from mesoslip.output.samples import times_of
 from mesoslip.output.tree import build_tree
 from mesoslip.plots.close_up import largest_slip, slip_window
 from mesoslip.plots.extent import Extent
-from mesoslip.plots.lattice import is_on_lattice
 from mesoslip.plots.lines import line
-from mesoslip.plots.trace import NAMES, UNITS, force_of
+from mesoslip.plots.snapshots import is_on_lattice
+from mesoslip.plots.trace_variables import NAMES, UNITS, force_of
 from mesoslip.quantities import UNKNOWN, Scale, scale_for, with_unit
 from mesoslip.simulation.run_realizations import Results
 from mesoslip.theory.contacts import contact_theory

@@ -13,16 +13,16 @@ from mesoslip.errors import FileError
 from mesoslip.output.arrays import Tree
 from mesoslip.plots.extent import Extent
 from mesoslip.plots.lines import line, max_size
-from mesoslip.plots.trace import UNITS, is_known
+from mesoslip.plots.trace_variables import UNITS, is_known
 from mesoslip.quantities import Scale, scale_for
 
-# Time from which on axes of short traces have the unit of their length, and starts are in s [s].
+# Times from this one on are far from 0: axes of short traces have the unit of their length [s].
 LATE = 60.0
 
 
 @dataclass(frozen=True)
 class HorizontalAxis:
-    """A horizontal axis: unit, label, limits in that unit, and origin in SI."""
+    """A horizontal axis: unit, label, limits in that unit, and origin [SI]."""
 
     scale: Scale
     label: str
@@ -37,13 +37,7 @@ class HorizontalAxis:
 
 
 def horizontal_axis(trees: Sequence[Tree], extent: Extent) -> HorizontalAxis:
-    """The horizontal axis of the part of outputs that is drawn.
-
-    Raises
-    ------
-    FileError
-        If a measured trace does not have the variable.
-    """
+    """The horizontal axis of the part of outputs that is drawn."""
     name, label = extent.horizontal
     if name != "time" and not all(is_known(tree, name) for tree in trees):
         raise FileError(
@@ -58,7 +52,7 @@ def horizontal_axis(trees: Sequence[Tree], extent: Extent) -> HorizontalAxis:
         ]
         return HorizontalAxis(scale_for(max_size(*lines), UNITS[name]), label, None)
     low, high = float(windows[:, 0].min()), float(windows[:, 1].max())
-    # The time of an instrument may be hours where a trace lasts seconds.
+    # The clock of an instrument may be at hours when a trace of seconds starts.
     is_late = low > high - low and high > LATE
     scale = scale_for(high - low if is_late else max_size(windows), "s")
     limits = (low / scale.size, high / scale.size) if high > low else None

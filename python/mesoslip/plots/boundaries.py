@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 # The measure in whose pictures the boundaries are drawn.
 REGIME = "regime"
-# Points of a sweep along a key from which lines are smooth, and points between them.
+# Minimum number of points along a key for smooth lines, and number of interpolated points.
 MIN_POINTS = 4
 FINE_POINTS = 200
 # Distance of the legend from axes, in sizes of its font.
@@ -29,13 +29,12 @@ LINES_BELOW = 3.6
 
 
 class Boundary(NamedTuple):
-    """The line on which a measure has a value."""
+    """The line on which a measure, which may be smooth or positive, has a value."""
 
     measure: str
     value: float
     style: Literal["-", "--", "-.", ":"]
     label: str
-    # Whether the measure is smooth, and positive.
     is_smooth: bool = True
     is_positive: bool = False
 
@@ -49,13 +48,7 @@ BOUNDARIES = (
 
 
 def draw_contours(axes: Axes, data: xr.Dataset, keys: list[SweptKey]) -> list[Line2D]:
-    """Draw the boundaries in a map over two keys, those whose measures pass their value.
-
-    Returns
-    -------
-    list of Line2D
-        Lines for a legend.
-    """
+    """Draw the boundaries that a map over two keys crosses; returns lines for a legend."""
     dimensions = data[REGIME].dims[:2]
     drawn = []
     for one in BOUNDARIES:
@@ -74,10 +67,10 @@ def draw_contours(axes: Axes, data: xr.Dataset, keys: list[SweptKey]) -> list[Li
 def _interpolated(
     boundary: Boundary, keys: list[SweptKey], values: Any
 ) -> tuple[Array, Array, Any, float]:
-    """Axes, values of a measure and level, between the points of a sweep by cubic splines.
+    """Axes, values of a measure and level, interpolated between the points of a sweep.
 
-    Splines are those of the logarithm of what is positive, over the axes as they are drawn.
-    Measures that are unknown somewhere, or that jump, stay as they are.
+    Cubic splines interpolate smooth measures that are known everywhere, positive ones by their
+    logarithm, over the axes as they are drawn. Other measures are not interpolated.
     """
     from scipy.interpolate import RectBivariateSpline
 
@@ -102,7 +95,7 @@ def _interpolated(
 
 
 def draw_crossings(axes: Axes, data: xr.Dataset, key: SweptKey) -> list[Line2D]:
-    """Draw the boundaries along one key, interpolated between its values; lines for a legend."""
+    """Draw the boundaries along one key, interpolated linearly; returns lines for a legend."""
     values = key.values[key.order]
     x = np.log(values) if key.is_logarithmic else values
     drawn = []

@@ -16,14 +16,14 @@ from mesoslip.plots.axis import time_since
 from mesoslip.plots.curves import Curve, curve, draw_curves
 from mesoslip.plots.extent import EVERYTHING, Extent
 from mesoslip.plots.style import BLUE, CONTACT, RED, SPRING, legend_above
-from mesoslip.plots.trace import NAMES, driving_force_of, force_of, is_known
+from mesoslip.plots.trace_variables import NAMES, driving_force_of, force_of, is_known
 
 # A slip: its columns of the catalogue, in SI.
 Slip = Mapping[str, float]
 
 
 def largest_slip(tree: Tree, extent: Extent = EVERYTHING) -> Slip | None:
-    """The slip with the largest drop of the spring force; None if there is no slip."""
+    """The slip with the largest drop of the spring force, if there is a slip."""
     columns = catalogue_of(tree).columns
     starts = columns["start_time"].values
     inside = np.flatnonzero(
@@ -51,20 +51,9 @@ def draw_slip(
     extent: Extent = EVERYTHING,
     title: str = "largest slip",
 ) -> None:
-    """Draw the forces during a slip, and variables of the trace below them.
+    """Draw the forces during a slip, and each of some variables of the trace in a panel below.
 
-    Parameters
-    ----------
-    panels
-        Axes for the forces, and one for each variable.
-    tree, slip
-        The output, and a slip.
-    names
-        The variables.
-    extent
-        Realization, and number of intervals.
-    title
-        Title of the legend.
+    The realization and the number of intervals are those of the extent.
     """
     times = times_of(tree)
     low, high = slip_window(slip)
@@ -96,25 +85,16 @@ def draw_slip(
 
 
 TIMES, FORCES = ("start_time", "end_time"), ("force_before", "force_after")
-# Samples in a slip, in a delay, and in a period of the ringing on the pinned contacts, with which
-# lines between them are the motion.
+# Minimum numbers of samples in a slip, in a delay, and in a period of the ringing of the pinned
+# slider, for lines between samples to show the motion.
 MIN_SAMPLES = {"slip": 12, "delay": 2, "period": 6}
 # Variables that change with every contact.
 OF_CONTACTS = frozenset({"contact_force", "detached_contacts"})
 
 
 class Sampling(NamedTuple):
-    """How finely a slip was recorded.
-
-    Attributes
-    ----------
-    size
-        Samples in the slip.
-    interval
-        Their mean distance [s].
-    max_interval, max_contact_interval
-        Distances that resolve the motion, and the contacts [s].
-    """
+    """Number of samples in a slip, their mean interval, and the intervals that would resolve the
+    motion of the slider and of the contacts [s]."""
 
     size: int
     interval: float
@@ -136,7 +116,7 @@ class Sampling(NamedTuple):
         return cls(count, (end - start) / max(count, 1), limit, fine)
 
     def resolves(self, name: str) -> bool:
-        """Whether lines between samples of a variable are its motion."""
+        """Whether lines between samples of a variable show its motion."""
         limit = self.max_contact_interval if name in OF_CONTACTS else self.max_interval
         return self.interval <= limit * (1 + 1e-6)
 
@@ -147,7 +127,7 @@ class Sampling(NamedTuple):
         return curve(tree, name, extent, **style)
 
     def note(self, tree: Tree, names: Sequence[str]) -> str:
-        """The unresolved motions, and the key that helps; empty if all are resolved."""
+        """A note on motion that is not resolved, with the key that helps; else empty."""
         if all(self.resolves(one) for one in (*names, *OF_CONTACTS) if is_known(tree, one)):
             return ""
         text = f"dots: samples, {self.size} in the slip"
@@ -155,14 +135,14 @@ class Sampling(NamedTuple):
 
 
 def _recorded_slip(slip: Slip) -> Curve:
-    """The spring force at both ends of a slip, as the catalogue has it."""
+    """The spring force at both ends of a slip, from the catalogue."""
     times, forces = (np.array([slip[one] for one in pair]) for pair in (TIMES, FORCES))
     style = {"color": SPRING["color"], "linewidth": 0.7, "label": "from start to end"}
     return Curve(times, forces, style)
 
 
 def _recorded_peak(slip: Slip) -> Curve:
-    """The peak velocity of a slip, as the catalogue has it."""
+    """The peak velocity of a slip, from the catalogue."""
     times = np.array([slip[one] for one in TIMES])
     peak = np.full(2, slip["peak_velocity"])
     return Curve(times, peak, {"color": RED, "linestyle": "--", "label": "peak"})

@@ -13,12 +13,12 @@ from mesoslip.output.arrays import Tree
 from mesoslip.plots.axis import HorizontalAxis
 from mesoslip.plots.extent import Extent
 from mesoslip.plots.lines import line, max_size
-from mesoslip.plots.trace import NAMES, UNITS
+from mesoslip.plots.trace_variables import NAMES, UNITS
 from mesoslip.quantities import scale_for
 
 Array = NDArray[np.float64]
 
-# Other realizations than the first one that are drawn behind it.
+# Maximum number of other realizations that are drawn behind the first one.
 MAX_OTHERS = 20
 
 
@@ -47,23 +47,14 @@ def draw_curves(
     horizontal: HorizontalAxis,
     label: str | None = None,
 ) -> None:
-    """Draw curves of one unit, with the prefix that suits them.
+    """Draw curves that have the unit of a variable, with the prefix that suits them.
 
-    Parameters
-    ----------
-    axes, curves
-        Where, and which.
-    name
-        A variable that has their unit.
-    horizontal
-        Their horizontal axis.
-    label
-        Their quantity; the name of the variable by default.
+    The label of their axis is the name of the variable by default.
     """
     largest = max_size(*(one.y for one in curves))
     scale = scale_for(largest, UNITS[name])
     for x, y, style in curves:
-        # The dashes of the style are for curves of several outputs, which have them from it.
+        # The dashes of the style are for curves of several outputs.
         style = {"linestyle": "-"} | style
         axes.plot((x - horizontal.origin) / horizontal.scale.size, y / scale.size, **style)
     axes.set_ylabel(scale.label(label or NAMES[name]))
@@ -80,7 +71,7 @@ def others_behind(tree: Tree, extent: Extent) -> Iterator[Extent]:
 
 
 def about_realizations(tree: Tree, extent: Extent) -> str:
-    """Which of several realizations are shown."""
+    """A line on which of several realizations are shown."""
     others = tree.sizes["realization"] - 1
     if others == 0:
         return ""

@@ -22,12 +22,12 @@ if TYPE_CHECKING:
     import xarray as xr
 
 NO_OPTIONS = Options()
-# Views of which a movie is made without a view, the first that an output has.
+# Views of a movie for which none was asked: the first that the output has.
 MOVIES = ("lattice", "layers", "contacts")
 
 
 class Picture(NamedTuple):
-    """A picture of outputs: the whole of it, and its most informative panel alone."""
+    """Draws outputs: all panels into a figure, a new one if it is None, or one panel into axes."""
 
     whole: Callable[[Canvas | None], Canvas]
     panel: Callable[[Axes], None]
@@ -51,8 +51,8 @@ def comparison(
     """A view of several outputs of one command over each other; see `draw`."""
     kind = kind_of_all(trees, names)
     chosen, options = _chosen(trees[0], view, options)
-    compare, compare_panel = chosen.compare, chosen.compare_panel
-    if compare is None or compare_panel is None:
+    compare_panel = chosen.compare_panel
+    if compare_panel is None:
         raise FileError(
             f"the view {chosen.name!r} shows one output at a time, {KINDS[kind].description}"
         )
@@ -63,19 +63,11 @@ def comparison(
         if axes.get_legend_handles_labels()[0]:
             legend_above(axes, columns=1)
 
-    return Picture(lambda figure: compare(trees, labels, options, figure), panel)
+    return Picture(lambda figure: chosen.compare(trees, labels, options, figure), panel)
 
 
 def movie_of(tree: xr.DataTree, name: str | None = None, options: Options = NO_OPTIONS) -> Movie:
-    """The movie of a view of an output, by default of the first one that it has.
-
-    Raises
-    ------
-    FileError
-        If the view has no movie, or the output lacks its data.
-    ConfigError
-        If there is no such view, or it does not have one of the options.
-    """
+    """The movie of a view of an output, by default of the first of `MOVIES` that it has."""
     if name is not None:
         chosen, options = _chosen(tree, name, options)
         if chosen.movie is None:
@@ -97,7 +89,7 @@ def movie_of(tree: xr.DataTree, name: str | None = None, options: Options = NO_O
 
 
 def _chosen(tree: xr.DataTree, name: str | None, options: Options) -> tuple[View, Options]:
-    """The view of a name and its options: of a sweep, the name is that of a measure."""
+    """The view of a name, and its options; the name of a view of a sweep is that of a measure."""
     kind = kind_of(tree)
     takes_measure = any(one.name == one.kind == kind and "measure" in one.options for one in VIEWS)
     if name is not None and name != kind and takes_measure:
@@ -106,12 +98,12 @@ def _chosen(tree: xr.DataTree, name: str | None, options: Options) -> tuple[View
 
 
 def labels_of(trees: Sequence[xr.DataTree], names: Sequence[str]) -> list[str]:
-    """A label for each output: its differences from the others."""
+    """A label for each output: how it differs from the others."""
     short = [Path(name).stem if name.endswith(".nc") else name for name in names]
     try:
         configs = [config_of(tree) for tree in trees]
     except FileError:
-        # A measured trace may have no configuration.
+        # A measured trace may lack a configuration.
         return short
     labels = differences.labels(configs, short)
     return [
@@ -129,28 +121,10 @@ def draw(
     figure: Canvas | None = None,
     axes: Axes | None = None,
 ) -> Canvas:
-    """Draw a view of outputs of any command.
+    """Draw a view of outputs of any command into a figure, or its most informative panel into axes.
 
-    Parameters
-    ----------
-    trees, names
-        The outputs, and names for those that do not differ. Several are drawn over each other.
-    view
-        Name of a view of their kind (`mesoslip.plots.views`), or measure of a sweep; the default
-        view of the kind by default.
-    options
-        Options of the view.
-    figure
-        Figure to draw into; a new one by default.
-    axes
-        Axes for the most informative panel alone.
-
-    Raises
-    ------
-    FileError
-        If the outputs lack the data of the view.
-    ConfigError
-        If there is no such view, or it does not have one of the options.
+    Several outputs are drawn over each other; names are for those that do not differ. The name of a
+    view may be a measure of a sweep.
     """
     if len(trees) == 1:
         chosen = picture(trees[0], view, options)

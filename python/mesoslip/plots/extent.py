@@ -18,32 +18,23 @@ HORIZONTAL = {
     "drive": ("drive_displacement", "displacement of the drive"),
 }
 
-# Intervals of a window of time in each of which a line shows the extremes, if the window has more
-# samples than that: several for each dot of a picture.
+# Intervals of a window of time in each of which a line shows the extremes, if there are more
+# samples: several for each pixel of a picture.
 MAX_PARTS = 4000
 
 
 @dataclass(frozen=True)
 class Extent:
-    """Realization, window of time and horizontal axis of a picture of a run.
-
-    Attributes
-    ----------
-    realization
-        Number of the realization; None for the first one with the others behind it.
-    start, end
-        Window of time [s].
-    against
-        "time", "displacement" or "drive"; by default the usual one of the view.
-    parts
-        Intervals of the window in each of which a line shows the extremes.
-    """
+    """Realization, window of time [s] and horizontal axis of a picture of a run."""
 
     realization: int | None = None
+    """None for the first one with the others behind it."""
     start: float = -math.inf
     end: float = math.inf
     against: str | None = None
+    """A key of `HORIZONTAL`; by default that of the view."""
     parts: int = MAX_PARTS
+    """Intervals of the window in each of which a line shows the extremes."""
 
     def __post_init__(self) -> None:
         found = []
@@ -71,13 +62,7 @@ class Extent:
         return self.start == -math.inf and self.end == math.inf
 
     def window(self, tree: Tree) -> tuple[float, float]:
-        """Start and end [s] of the part of an output that is drawn.
-
-        Raises
-        ------
-        FileError
-            If the output has no such realization, or no sample in the window.
-        """
+        """Start and end [s] of the part of an output that is drawn, which has a sample."""
         last = tree.sizes["realization"] - 1
         if not 0 <= self.first <= last:
             raise FileError(f"there is no realization {self.first}; the last one is {last}")
@@ -95,7 +80,7 @@ EVERYTHING = Extent()
 
 
 def _between(start: float, end: float) -> str:
-    """A window of time in words; it may be open at either end."""
+    """A window of time, which may be open at either end, in words."""
     parts = [f"from {start:g} s on"] if math.isfinite(start) else []
     parts += [f"until {end:g} s"] if math.isfinite(end) else []
     return " ".join(parts).replace(" on until", " to")

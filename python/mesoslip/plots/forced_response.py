@@ -12,41 +12,30 @@ from mesoslip.configuration.config import Config
 from mesoslip.errors import MesoslipError
 from mesoslip.output.arrays import Arrays, Tree
 from mesoslip.plots.logarithmic import logarithmic
-from mesoslip.plots.record import MAX_MARKS
-from mesoslip.plots.style import BLUE, RED, Canvas, canvas, styled, titles, write_title
+from mesoslip.plots.response_record import MAX_MARKS
+from mesoslip.plots.style import BLUE, POINTS, RED, Canvas, canvas, titles, write_title
 from mesoslip.quantities import scale_for, with_error
 from mesoslip.theory.contacts import contact_theory
 
 Array = NDArray[np.float64]
 
-# Samples of the displacement that are drawn, and velocities of the theory.
+# Maximum number of samples of the displacement that are drawn; velocities of the theory.
 MAX_DOTS, THEORY_POINTS = 20_000, 30
 
 
-def draw_forced(tree: Tree, experiment: Experiment, figure: Canvas | None = None) -> Canvas:
-    """Displacement over time; creep velocities with those of the theory; static friction.
-
-    Parameters
-    ----------
-    tree
-        The output.
-    experiment
-        The same as an experiment, driven by a force.
-    figure
-        Where; a figure of its own by default.
-    """
+def draw_forced(tree: Tree, experiment: Experiment, figure: Canvas | None) -> Canvas:
+    """Displacement over time; creep velocities with those of the theory; static friction."""
     found = response_of([experiment], with_fit=False)
     creep, ramps = found.children["creep"], found.children["ramps"]
     creep = creep.isel(force_stage=creep["velocity"].values > 2 * creep["velocity_error"].values)
     ramps = ramps.isel(ramp=np.isfinite(ramps["static_friction"].values))
     drawn = ((_draw_creep, creep), (_draw_friction, ramps))
     panels = [(draw, data) for draw, data in drawn if data["stage_number"].values.size]
-    with styled():
-        figure = canvas(figure, (6.5, 5.0 if panels else 3.0))
-        grid = figure.add_gridspec(2 if panels else 1, max(1, len(panels)))
-        _draw_displacement(figure.add_subplot(grid[0, :]), tree, experiment)
-        for column, (draw, data) in enumerate(panels):
-            draw(figure.add_subplot(grid[1, column]), experiment, data)
+    figure = canvas(figure, (6.5, 5.0 if panels else 3.0))
+    grid = figure.add_gridspec(2 if panels else 1, max(1, len(panels)))
+    _draw_displacement(figure.add_subplot(grid[0, :]), tree, experiment)
+    for column, (draw, data) in enumerate(panels):
+        draw(figure.add_subplot(grid[1, column]), experiment, data)
     return figure
 
 
@@ -69,20 +58,14 @@ def _draw_displacement(axes: Axes, tree: Tree, experiment: Experiment) -> None:
 
 
 def _draw_creep(axes: Axes, experiment: Experiment, data: Arrays) -> None:
-    """Draw the force over the velocity of creep, and the theory with the slider's damping."""
+    """Draw the force over the velocity of creep, and that of the theory with damping."""
     velocity, force = data["velocity"].values, data["force"].values / experiment.static_force
     unit = scale_for(float(np.max(velocity)), "m/s")
     is_steady = data["is_steady"].values == 1
     error = data["velocity_error"].values / unit.size
     for chosen, colour in ((is_steady, "black"), (~is_steady, "0.7")):
-        axes.errorbar(
-            velocity[chosen] / unit.size,
-            force[chosen],
-            xerr=error[chosen],
-            fmt="o",
-            color=colour,
-            markersize=3,
-        )
+        x, xerr = velocity[chosen] / unit.size, error[chosen]
+        axes.errorbar(x, force[chosen], xerr=xerr, **POINTS | {"color": colour})
     config = experiment.config
     grid = np.geomspace(0.5 * velocity.min(), 2 * velocity.max(), THEORY_POINTS)
     theory = None if config is None else _creep_forces(config, grid)
@@ -115,7 +98,7 @@ def _draw_friction(axes: Axes, experiment: Experiment, data: Arrays) -> None:
     rate, friction = data["force_rate"].values, data["static_friction"].values
     unit = scale_for(float(np.max(rate)), "N/s")
     error = np.nan_to_num(data["static_friction_error"].values) * scale
-    axes.errorbar(rate / unit.size, friction * scale, error, fmt="o", color="black", markersize=3)
+    axes.errorbar(rate / unit.size, friction * scale, error, **POINTS)
     logarithmic(axes, "x")
     line = friction_line(data)
     if line is not None:

@@ -1,4 +1,4 @@
-"""Lines of long traces: all samples of a window, or the extremes of many."""
+"""Lines of long traces: all samples of a window, or the extremes in each of its intervals."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from mesoslip.plots.extent import MAX_PARTS, Extent
 
 Array = NDArray[np.float64]
 
-# Samples that are read at a time.
+# Samples that are read at once.
 BLOCK = 2**20
 
 
@@ -23,26 +23,11 @@ def extremes(
     window: tuple[float, float],
     count: int = MAX_PARTS,
 ) -> list[Array]:
-    """Samples at the minima and maxima of variables in each interval of a window of time.
+    """Values of variables, in order of time, at the samples where one of them is minimal or maximal
+    in an interval of a window of time [s].
 
     Intervals have the same duration, or the same number of samples if the time is not among the
     variables.
-
-    Parameters
-    ----------
-    parts
-        Samples of a realization.
-    names
-        The variables.
-    window
-        Start and end [s].
-    count
-        Number of intervals.
-
-    Returns
-    -------
-    list of array
-        Values of each variable at these samples, in order of time.
     """
     start, end = window
     scale = count / max(end - start, np.finfo(float).tiny)
@@ -56,7 +41,7 @@ def extremes(
             if "time" in names:
                 interval = np.minimum(((times - start) * scale).astype(int), count - 1)
             else:
-                # A slip is short in time and long in space: as many samples in each interval.
+                # A slip is short in time and long in space.
                 interval = (np.arange(at, to) - first) * count // (after - first)
             begins = np.flatnonzero(np.diff(interval, prepend=-1))
             lengths = np.diff(begins, append=len(interval))
@@ -82,7 +67,7 @@ def extremes(
 def line(
     tree: Tree, names: Sequence[str], extent: Extent, window: tuple[float, float]
 ) -> list[Array]:
-    """Values of variables along a line: all samples of a window, or the extremes of many."""
+    """Values of variables along a line: all samples of a window, or the extremes of too many."""
     parts = samples(tree, extent.first)
     if sum(np.subtract(*part.inside(window)[::-1]) for part in parts) > 4 * extent.parts:
         return extremes(parts, names, window, extent.parts)

@@ -1,4 +1,4 @@
-"""Logarithmic axes whose labels do not collide, however few decades they span."""
+"""Logarithmic axes whose labels do not collide over any number of decades."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from matplotlib.ticker import LogFormatterSciNotation, LogLocator, NullFormatter
 
 from mesoslip.quantities import number
 
-# Decades from which powers of ten alone are labelled, and multiples of them with fewer.
+# Decades from which only powers of ten are labelled; with fewer, multiples of them too.
 MANY_DECADES = 2.0
 MULTIPLES = ((1, 2, 5), (1, 1.5, 2, 3, 5, 7), tuple(np.arange(10, 100) / 10))
-# Labels that an axis has at least, as far as its range allows.
+# Minimum number of labels of an axis, if its range allows it.
 MIN_LABELS = 3
 
 
@@ -28,10 +28,9 @@ def logarithmic(axes: Axes, which: str) -> None:
 
 
 class _Locator(LogLocator):
-    """Powers of ten; of a short range 1, 2, 5 times them, or more."""
+    """Powers of ten; over few decades 1, 2, 5 times them, or more multiples."""
 
     def tick_values(self, vmin: float, vmax: float) -> Sequence[float]:
-        """Places of labels between two values."""
         low, high = sorted((vmin, vmax))
         if not 0 < low < high or math.log10(high / low) >= MANY_DECADES:
             return super().tick_values(vmin, vmax)
@@ -47,10 +46,9 @@ class _Locator(LogLocator):
 
 
 class _Formatter(LogFormatterSciNotation):
-    """Powers of ten as such, over few decades plain numbers."""
+    """Powers of ten; over few decades plain numbers."""
 
     def __call__(self, x: float, pos: int | None = None) -> str:
-        """The label at a place."""
         assert self.axis is not None
         low, high = sorted(self.axis.get_view_interval())
         if 0 < low < high and math.log10(high / low) < MANY_DECADES and 1e-3 <= x < 1e5:

@@ -10,31 +10,19 @@ from mesoslip.output.arrays import Tree
 from mesoslip.plots.axis import HorizontalAxis
 from mesoslip.plots.extent import Extent
 from mesoslip.plots.style import BLUE, RED, YELLOW
-from mesoslip.plots.trace import UNITS
+from mesoslip.plots.trace_variables import UNITS
 from mesoslip.quantities import scale_for
 
-# Maximum number of slips or impulses that are marked: more are a band.
+# Maximum number of slips or impulses that are marked: more would be a band.
 MAX_MARKS = 2000
 
 
 def draw_marks(
     axes: Axes, tree: Tree, name: str, extent: Extent, horizontal: HorizontalAxis
 ) -> bool:
-    """Mark starts and ends of slips, and samples of impulses, on the force of a measured trace.
+    """Mark starts and ends of slips, and impulses, on the force of a measured trace.
 
-    Parameters
-    ----------
-    axes
-        Axes in which the force is drawn.
-    tree, name
-        The output, and the variable with its force.
-    extent, horizontal
-        The part of it that is shown.
-
-    Returns
-    -------
-    bool
-        Whether anything is marked.
+    Returns whether anything is marked.
     """
     root = tree.to_dataset()
     time, force = root["time"].values, root[name].values[0]
@@ -44,16 +32,9 @@ def draw_marks(
     across = root[extent.horizontal[0]].values
     across = across if across.ndim == 1 else across[0]
     slips = group_of(tree, "slips")
-    marks = [
-        (
-            slips["start_time"].values,
-            slips["force_before"].values,
-            "v",
-            "start of a slip",
-            RED,
-        ),
-        (slips["end_time"].values, slips["force_after"].values, "^", "end of a slip", BLUE),
-    ]
+    starts = slips["start_time"].values, slips["force_before"].values
+    ends = slips["end_time"].values, slips["force_after"].values
+    marks = [(*starts, "v", "start of a slip", RED), (*ends, "^", "end of a slip", BLUE)]
     if "noise" in tree.children and "impulse_time" in tree.children["noise"]:
         at = group_of(tree, "noise")["impulse_time"].values
         marks.append((at, np.interp(at, time, force), "x", "impulse, taken off", YELLOW))

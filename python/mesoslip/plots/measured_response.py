@@ -18,8 +18,8 @@ from mesoslip.errors import RunError
 from mesoslip.output.arrays import Arrays, Tree
 from mesoslip.plots.logarithmic import logarithmic
 from mesoslip.plots.printing import is_narrow
-from mesoslip.plots.record import draw_record, fit_label, force_unit, title_record
-from mesoslip.plots.style import RED, Canvas, canvas, styled
+from mesoslip.plots.response_record import draw_record, fit_label, force_unit, title_record
+from mesoslip.plots.style import POINTS, RED, Canvas, canvas
 from mesoslip.quantities import Scale, scale_for, with_error
 
 Array = NDArray[np.float64]
@@ -29,7 +29,7 @@ MARGIN = 3.0
 
 
 def best_fit(experiment: Experiment) -> MeasuredFit | None:
-    """The law that the record prefers, or the best of one state; None without one."""
+    """The law that the record prefers, or the best of one state, if there is a fit."""
     records = records_of(experiment)
     if isinstance(records, str):
         return None
@@ -40,22 +40,12 @@ def best_fit(experiment: Experiment) -> MeasuredFit | None:
     preferred = preferred_law(fits)
     if preferred:
         return fits[preferred]
-    able = [one for one in fits.values() if one.model.states == 1]
-    return min(able, key=lambda one: one.information_criterion, default=None)
+    simple = [one for one in fits.values() if one.model.states == 1]
+    return min(simple, key=lambda one: one.information_criterion, default=None)
 
 
 def draw_measured_record(axes: Axes, experiment: Experiment, scale: Scale) -> None:
-    """Draw the record of a measured trace with the law that fits it best.
-
-    Parameters
-    ----------
-    axes
-        Where.
-    experiment
-        The trace.
-    scale
-        Unit of the displacement of the load point.
-    """
+    """Draw the record of a measured trace with the law that fits it best."""
     draw_record(axes, experiment, scale)
     found = best_fit(experiment)
     if found is not None:
@@ -89,7 +79,7 @@ def _draw_fit(axes: Axes, experiment: Experiment, found: MeasuredFit, scale: Sca
 
 
 def _draw_residuals(axes: Axes, experiment: Experiment, found: MeasuredFit, scale: Scale) -> None:
-    """Draw the residuals of the points over their noise."""
+    """Draw the residuals of a fit over the noise of its points."""
     deviation = np.sqrt(np.sum(found.noise.factor**2, axis=1)) * found.model.scale
     x = _horizontal(experiment, found) / scale.size
     axes.plot(x, found.residual / deviation, ".", color="black", markersize=2)
@@ -105,9 +95,7 @@ def _draw_rates(axes: Axes, response: Arrays, unit: Scale) -> None:
     name = next(one for one in ("rate_dependence_coefficient", "rate_dependence") if one in steps)
     value, error = steps[name].values / unit.size, steps[f"{name}_error"].values / unit.size
     scale = scale_for(float(velocity.max()), "m/s")
-    axes.errorbar(
-        velocity / scale.size, value, error, fmt="o", color="black", markersize=3, label="means"
-    )
+    axes.errorbar(velocity / scale.size, value, error, **POINTS, label="means")
     fits = [
         row
         for row in rows_of(response, "rate_and_state")
@@ -118,14 +106,9 @@ def _draw_rates(axes: Axes, response: Arrays, unit: Scale) -> None:
     if not shown and steps.sizes["step"] == 1:
         shown = [row | {"stage_number": steps["stage_number"].values[0]} for row in fits]
     for row in shown:
-        axes.errorbar(
-            1.03 * velocity[stages[row["stage_number"]]] / scale.size,
-            row[_key(row)] / unit.size,
-            row[_stem(row)] / unit.size,
-            fmt="s",
-            color=RED,
-            markersize=3,
-        )
+        x = 1.03 * velocity[stages[row["stage_number"]]] / scale.size
+        value, error = row[_key(row)] / unit.size, row[f"{_key(row)}_error"] / unit.size
+        axes.errorbar(x, value, error, **POINTS | {"fmt": "s", "color": RED})
     if shown:
         axes.plot([], [], "s", color=RED, markersize=3, label="law")
         axes.legend()
@@ -140,64 +123,43 @@ def _key(row: dict[str, float]) -> str:
     return "a_minus_b_coefficient" if "a_minus_b_coefficient" in row else "a_minus_b"
 
 
-def _stem(row: dict[str, float]) -> str:
-    """Name of the error of a - b."""
-    return "a_minus_b_coefficient_error" if "a_minus_b_coefficient" in row else "a_minus_b_error"
-
-
 def _draw_healing(axes: Axes, response: Arrays, unit: Scale) -> None:
     """Draw the healing against the hold time."""
     holds = response.children["holds"]
     name = next(one for one in ("healing_coefficient", "healing") if one in holds)
     error = np.nan_to_num(holds[f"{name}_error"].values) / unit.size
-    axes.errorbar(
-        holds["hold_time"].values,
-        holds[name].values / unit.size,
-        error,
-        fmt="o",
-        color="black",
-        markersize=3,
-    )
+    axes.errorbar(holds["hold_time"].values, holds[name].values / unit.size, error, **POINTS)
     logarithmic(axes, "x")
     axes.set_xlabel("hold time (s)")
     axes.set_ylabel(f"healing ({unit.name})")
 
 
-def draw_measured(tree: Tree, experiment: Experiment, figure: Canvas | None = None) -> Canvas:
-    """The record with the law that fits best, its residuals, a - b against velocity, and healing.
-
-    Parameters
-    ----------
-    tree, experiment
-        The trace.
-    figure
-        Figure to draw into; a new one by default.
-    """
+def draw_measured(tree: Tree, experiment: Experiment, figure: Canvas | None) -> Canvas:
+    """The record with the law that fits best, residuals, a - b against velocity, and healing."""
     found = best_fit(experiment)
     response = response_of([experiment])
     has_steps = response.children["steps"].sizes["step"] > 0
     has_holds = response.children["holds"].sizes["hold"] > 0
     unit = force_unit(experiment)
     scale = scale_for(float(np.max(np.abs(experiment.drive))), "m")
-    with styled():
-        below = has_steps + has_holds
-        rows = below if is_narrow(figure) else min(below, 1)
-        columns = 1 if rows > 1 else max(below, 1)
-        size = (3.4 if rows > 1 else 6.5, 3.0 + 1.4 * (found is not None) + 2.2 * rows)
-        figure = canvas(figure, size)
-        heights = [2.2, *([1.0] if found is not None else []), *([1.8] * rows)]
-        grid = figure.add_gridspec(len(heights), columns, height_ratios=heights)
-        record = figure.add_subplot(grid[0, :])
-        draw_record(record, experiment, scale)
-        if found is not None:
-            _draw_fit(record, experiment, found, scale)
-        title_record(record, tree)
-        if found is not None:
-            residuals = figure.add_subplot(grid[1, :], sharex=record)
-            _draw_residuals(residuals, experiment, found, scale)
-            record.set_xlabel("")
-        if has_steps:
-            _draw_rates(figure.add_subplot(grid[-max(rows, 1), 0]), response, unit)
-        if has_holds:
-            _draw_healing(figure.add_subplot(grid[-1, columns - 1]), response, unit)
+    below = has_steps + has_holds
+    rows = below if is_narrow(figure) else min(below, 1)
+    columns = 1 if rows > 1 else max(below, 1)
+    size = (3.4 if rows > 1 else 6.5, 3.0 + 1.4 * (found is not None) + 2.2 * rows)
+    figure = canvas(figure, size)
+    heights = [2.2, *([1.0] if found is not None else []), *([1.8] * rows)]
+    grid = figure.add_gridspec(len(heights), columns, height_ratios=heights)
+    record = figure.add_subplot(grid[0, :])
+    draw_record(record, experiment, scale)
+    if found is not None:
+        _draw_fit(record, experiment, found, scale)
+    title_record(record, tree)
+    if found is not None:
+        residuals = figure.add_subplot(grid[1, :], sharex=record)
+        _draw_residuals(residuals, experiment, found, scale)
+        record.set_xlabel("")
+    if has_steps:
+        _draw_rates(figure.add_subplot(grid[-max(rows, 1), 0]), response, unit)
+    if has_holds:
+        _draw_healing(figure.add_subplot(grid[-1, columns - 1]), response, unit)
     return figure

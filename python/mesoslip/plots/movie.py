@@ -27,9 +27,9 @@ MAX_FRAMES = 100
 # Time for which a frame is shown [s], and dots of a frame per inch.
 FRAME_SECONDS = 0.08
 DPI = 120
-# Share of the frames that are at equal intervals of time; the others are where there is motion.
+# Share of the frames at equal intervals of time; the others follow the motion.
 EVEN_SHARE = 0.3
-# Size of a .gif [bytes]; colours and magnifications that are tried until it is below.
+# Maximum size of a .gif [bytes]; numbers of colours and magnifications that are tried for it.
 MAX_GIF_BYTES = 3_000_000
 GIF_FORMS = ((256, 1.0), (64, 1.0), (32, 1.0), (32, 0.75), (16, 0.5), (8, 0.35))
 # Frames from which the colours of a .gif are taken.
@@ -38,7 +38,7 @@ SAMPLED_FRAMES = 8
 
 @dataclass(frozen=True)
 class Movie:
-    """A movie: a figure whose axes stay, the number of frames, and what shows one of them."""
+    """A movie: a figure, the number of frames, and the function that changes it to show one."""
 
     figure: Figure
     count: int
@@ -51,23 +51,16 @@ class Movie:
         for number in range(self.count):
             self.show(number)
             canvas.draw()  # type: ignore[no-untyped-call]
-            # The layout of the first frame is that of all.
+            # All frames have the layout of the first.
             self.figure.set_layout_engine("none")
             frame = np.asarray(canvas.buffer_rgba())  # type: ignore[no-untyped-call]
             yield frame[..., :3].copy()
 
 
 def chosen_frames(times: Array, activity: Array, count: int = MAX_FRAMES) -> NDArray[np.intp]:
-    """Indices of samples that become frames: many where there is much motion.
+    """Indices of samples that become frames, many where there is much motion.
 
-    Parameters
-    ----------
-    times
-        Times of the samples, shape (T).
-    activity
-        How much moves between them, of any unit, shape (T - 1).
-    count
-        Maximum number of frames.
+    The motion between samples at times of shape (T) has shape (T - 1) and any unit.
     """
     if times.size <= count:
         return np.arange(times.size)
@@ -80,18 +73,12 @@ def chosen_frames(times: Array, activity: Array, count: int = MAX_FRAMES) -> NDA
 
 
 def time_bar(axes: Axes) -> Any:
-    """A line across axes over time that is moved from frame to frame."""
+    """A vertical line over a time axis, which moves from frame to frame."""
     return axes.axvline(0, color=RED, linewidth=1.0)
 
 
 def write(movie: Movie, path: Path) -> None:
-    """Write a movie, a .gif or an .mp4.
-
-    Raises
-    ------
-    FileError
-        If it cannot be written, or nothing here writes an .mp4.
-    """
+    """Write a movie, a .gif or an .mp4."""
     if path.suffix.lower() == ".mp4":
         program = _ffmpeg(path)
         with written_whole(path) as part:
@@ -102,7 +89,7 @@ def write(movie: Movie, path: Path) -> None:
 
 
 def _write_gif(frames: list[NDArray[np.uint8]], path: Path) -> None:
-    """Write frames of one palette, with fewer colours and pixels as long as they take too much."""
+    """Write frames of one palette, with fewer colours and pixels until the file is small enough."""
     chosen = np.unique(np.linspace(0, len(frames) - 1, SAMPLED_FRAMES).astype(int))
     sample = Image.fromarray(np.concatenate([frames[one] for one in chosen]))
     for colors, magnification in GIF_FORMS:
@@ -114,22 +101,14 @@ def _write_gif(frames: list[NDArray[np.uint8]], path: Path) -> None:
                 size = [round(magnification * one) for one in image.size]
                 image = image.resize((size[0], size[1]), Image.Resampling.LANCZOS)
             images.append(image.quantize(palette=palette, dither=Image.Dither.NONE))
-        duration = round(1000 * FRAME_SECONDS)
-        images[0].save(
-            path,
-            format="GIF",
-            save_all=True,
-            append_images=images[1:],
-            duration=duration,
-            loop=0,
-            optimize=True,
-        )
+        options = {"duration": round(1000 * FRAME_SECONDS), "loop": 0, "optimize": True}
+        images[0].save(path, format="GIF", save_all=True, append_images=images[1:], **options)
         if path.stat().st_size <= MAX_GIF_BYTES:
             return
 
 
 def _ffmpeg(path: Path) -> str:
-    """The program ffmpeg: that of imageio-ffmpeg, or one that is installed."""
+    """The program ffmpeg, of imageio-ffmpeg or of the system."""
     try:
         import imageio_ffmpeg
 
@@ -147,7 +126,7 @@ def _ffmpeg(path: Path) -> str:
 def _write_mp4(movie: Movie, path: Path, program: str) -> None:
     process = None
     for frame in movie.frames():
-        # The codec takes even sizes only.
+        # The codec needs even sizes.
         height, width = (size - size % 2 for size in frame.shape[:2])
         if process is None:
             options = [

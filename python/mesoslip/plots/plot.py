@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import operator
+import string
 from collections.abc import Sequence
 from contextlib import ExitStack
-from typing import TYPE_CHECKING
+
+import matplotlib as mpl
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure, SubFigure
+from matplotlib.ticker import MaxNLocator
 
 from mesoslip.configuration.reading import PathLike, as_path
 from mesoslip.configuration.units import to_si
@@ -15,14 +21,13 @@ from mesoslip.output.inputs import OutputLike, opened, several
 from mesoslip.plots.draw import draw, movie_of
 from mesoslip.plots.extent import Extent
 from mesoslip.plots.movie import ENDINGS, write
-from mesoslip.plots.printing import Print, finish, printed
-from mesoslip.plots.style import save, styled
+from mesoslip.plots.printing import UNLETTERED, Print, current, printed
+from mesoslip.plots.style import Canvas, filled, save, styled
 from mesoslip.plots.views import takes_arrays
 from mesoslip.plots.views.base import Options
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure, SubFigure
+# Ticks of an axis that has no room for more.
+FEW_TICKS = 4
 
 
 def plot(
@@ -56,13 +61,12 @@ def plot(
         The output, or several.
     file
         Where to save the picture; nowhere by default. If its name ends in ``.gif`` or ``.mp4`` it
-        is a movie: of the views "layers", "contacts", or "lattice", which shows the avalanche that
-        spreads before a snapshot, or all snapshots. Without a view it is one that the output has.
+        is a movie: of the view "layers", "contacts", or "lattice", which shows the avalanche that
+        spreads before a snapshot, or all snapshots; by default of the first that the output has.
     view
-        View of a run, such as "avalanches" for their sizes, "lattice" and
-        "contacts" for a snapshot, "layers" for
-        the waves in an elastic slider, "response" for steady forces, velocity steps and holds; or
-        measure of a sweep.
+        View of a run, such as "avalanches" for their sizes, "lattice" and "contacts" for a
+        snapshot, "layers" for the waves in an elastic slider, "response" for steady forces,
+        velocity steps and holds; or measure of a sweep.
     snapshot
         Number of the snapshot; that after the largest avalanche by default.
     realization
@@ -79,7 +83,7 @@ def plot(
         Axes for the most informative panel, and for nothing else.
     width
         Width of a new figure for print, such as "8.6 cm" (or 0.086, in meters) for a column of a
-        journal; panels that stood beside each other are below each other if it is narrow.
+        journal. In a narrow figure panels are below each other, not side by side.
     font_size
         Size of the font [pt]; 8 by default.
     title
@@ -141,20 +145,14 @@ def plot(
         drawn = draw(trees, names, view, options, figure=figure, axes=ax)
         if ax is None:
             with styled():
-                finish(drawn)
+                _finish(drawn)
         if path is not None:
             save(drawn, path)
     return drawn
 
 
 def _quantity(key: str, value: object, unit: str, example: str) -> float:
-    """A quantity in SI: a string with a unit, a number, or an array of one number.
-
-    Raises
-    ------
-    ConfigError
-        If it is something else, or has another dimension.
-    """
+    """A quantity in SI: a string with a unit, a number, or an array of one number."""
     if not isinstance(value, str):
         return _number(key, value, f"a quantity such as {example!r}, or a number in {unit}")
     try:
@@ -164,13 +162,7 @@ def _quantity(key: str, value: object, unit: str, example: str) -> float:
 
 
 def _number(key: str, value: object, wanted: str) -> float:
-    """A number, or an array of one; ``wanted`` is for the message.
-
-    Raises
-    ------
-    ConfigError
-        If it is something else.
-    """
+    """A number, or an array of one; ``wanted`` is for the message."""
     try:
         if isinstance(value, str | bytes | bool):
             raise TypeError
@@ -180,16 +172,72 @@ def _number(key: str, value: object, wanted: str) -> float:
 
 
 def _whole(key: str, value: object) -> int | None:
-    """A whole number, or None.
-
-    Raises
-    ------
-    ConfigError
-        If it is something else.
-    """
     try:
         if isinstance(value, bool):
             raise TypeError
         return None if value is None else operator.index(value)  # type: ignore[arg-type]
     except TypeError:
         raise ConfigError([Problem("", key, "must be a whole number", value)]) from None
+
+
+def _finish(figure: Canvas) -> None:
+    """Add the title and the letters of panels; long labels of short axes become two lines."""
+    how = current()
+    if how.title:
+        text = filled(how.title, 0.95 * figure.bbox.width / figure.figure.dpi)
+        figure.suptitle(text, x=0.01, ha="left")
+    if how.letters:
+        panels = [one for one in figure.axes if _is_panel(one)]
+        if len(panels) > 1:
+            for letter, axes in zip(string.ascii_lowercase, panels, strict=False):
+                axes.annotate(
+                    f"({letter})",
+                    (0, 1),
+                    xycoords="axes fraction",
+                    xytext=(-4, 4),
+                    textcoords="offset points",
+                    ha="right",
+                    va="bottom",
+                )
+    if how.width is not None or how.font_size is not None:
+        _wrap_labels(figure)
+        _thin_ticks(figure)
+
+
+def _is_panel(axes: Axes) -> bool:
+    """Whether axes are a panel of their own, and no colour bar or second scale of others."""
+    others = [one for one in axes.get_shared_x_axes().get_siblings(axes) if one is not axes]
+    is_second = axes.patch.get_visible() is False and any(
+        one.get_subplotspec() == axes.get_subplotspec() for one in others
+    )
+    return axes.get_label() not in (UNLETTERED, "<colorbar>") and not is_second
+
+
+def _wrap_labels(figure: Canvas) -> None:
+    """Break vertical labels that are longer than their axes, and would reach into others."""
+    figure.figure.draw_without_rendering()
+    for axes in figure.axes:
+        label = axes.yaxis.label
+        height = axes.get_window_extent().height
+        if label.get_text() and label.get_window_extent().height > height:
+            label.set_text(_in_two_lines(label.get_text()))
+
+
+def _thin_ticks(figure: Canvas) -> None:
+    """Use fewer ticks on horizontal axes whose labels would touch each other."""
+    figure.figure.draw_without_rendering()
+    for axes in figure.axes:
+        labels = [one.get_window_extent() for one in axes.get_xticklabels() if one.get_text()]
+        gap = 0.5 * mpl.rcParams["font.size"] * figure.figure.dpi / 72
+        touch = any(after.x0 < before.x1 + gap for before, after in itertools.pairwise(labels))
+        if touch and isinstance(axes.xaxis.get_major_locator(), MaxNLocator):
+            axes.locator_params(axis="x", nbins=FEW_TICKS)
+
+
+def _in_two_lines(text: str) -> str:
+    """A text broken at the space nearest to its middle, not within a formula."""
+    spaces = [at for at, one in enumerate(text) if one == " " and text[:at].count("$") % 2 == 0]
+    if not spaces:
+        return text
+    at = min(spaces, key=lambda one: abs(one - len(text) / 2))
+    return f"{text[:at]}\n{text[at + 1 :]}"

@@ -30,11 +30,13 @@ SPRING: dict[str, Any] = {"color": RED, "linestyle": "--", "label": "spring forc
 CONTACT: dict[str, Any] = {"color": "black", "label": "contact force $F$"}
 # Realizations behind the first one.
 OTHERS: dict[str, Any] = {"color": "0.75", "linewidth": 0.5, "zorder": 1}
+# Measured points with errors.
+POINTS: dict[str, Any] = {"fmt": "o", "color": "black", "markersize": 3}
 # Characters in an inch of a line of the size 8.
 CHARACTERS_PER_INCH = 16
 # Width of the ticks and labels beside axes [inch].
 BESIDE_AXES = 0.6
-# Changed keys that a caption names.
+# Maximum number of changed keys that a caption names.
 MAX_KEYS = 6
 
 
@@ -66,16 +68,8 @@ def titles(
 ) -> None:
     """Write the title of an output over axes, and below it its changes from its base.
 
-    Parameters
-    ----------
-    axes, tree
-        Where, and of which output.
-    about
-        A further line, such as the realizations that are shown.
-    mathematical
-        A last line that may have formulas.
-    beside_legend
-        Whether a line is left for a legend between title and axes.
+    A line about what is shown may follow, and a last one with formulas. `beside_legend` leaves room
+    for a legend between title and axes.
     """
     width = axes_width(axes)
     texts = [*headings(tree), about]
@@ -91,7 +85,7 @@ def write_title(axes: Axes, text: str) -> None:
 
 
 def headings(tree: Tree) -> list[str]:
-    """The title of an output and its changes from its base; none if the picture has a title."""
+    """The title of an output and its changes from its base; empty if the picture has a title."""
     if current().title is not None:
         return []
     title = tree.attrs.get("title", "")
@@ -121,20 +115,13 @@ def axes_width(axes: Axes) -> float:
     whole = figure.bbox.width / figure.figure.dpi
     if bounds is None:
         return 0.85 * whole
-    part = _part(bounds)
-    return min(part * whole, part * whole / 0.9 - BESIDE_AXES)
-
-
-def _part(spec: Any) -> float:
-    """Approximate width of axes of a grid over that of the figure."""
-    ratios = spec.get_gridspec().get_width_ratios()
-    own = ratios[spec.colspan.start : spec.colspan.stop]
-    part: float = 0.9 * sum(own) / sum(ratios)
-    return part
+    ratios: Any = bounds.get_gridspec().get_width_ratios()
+    width = 0.9 * sum(ratios[bounds.colspan.start : bounds.colspan.stop]) / sum(ratios) * whole
+    return float(min(width, width / 0.9 - BESIDE_AXES))
 
 
 def legend_above(axes: Axes, columns: int = 3, title: str | None = None) -> None:
-    """Put the legend above axes, where it hides no data, in at most so many columns."""
+    """Put the legend above axes, where it hides no data, in up to a number of columns."""
     axes.legend(
         loc="lower left",
         bbox_to_anchor=(0, 1.0),
@@ -148,7 +135,7 @@ def legend_above(axes: Axes, columns: int = 3, title: str | None = None) -> None
 
 
 def _legend_columns(axes: Axes, columns: int = 3) -> int:
-    """Columns of a legend that fit above axes."""
+    """Number of columns of a legend that fit above axes."""
     # Formulas are shorter than their source; a line and its distance take five characters.
     labels = axes.get_legend_handles_labels()[1]
     lengths = [len(re.sub(r"\\[a-z]+|[${}_^]", "", one)) + 5 for one in labels]
@@ -190,16 +177,16 @@ _LOCK = threading.RLock()
 
 @contextmanager
 def styled() -> Iterator[None]:
-    """Draw in this style; that of the session stays as it was.
+    """Draw in the style of mesoslip, one thread at a time, and restore the style of the session.
 
-    Matplotlib has one style for the whole process, so only one thread draws at a time.
+    Matplotlib has one style for the whole process.
     """
     with _LOCK, mpl.rc_context(current().settings):
         yield
 
 
 def canvas(figure: Canvas | None, size: tuple[float, float]) -> Canvas:
-    """The given figure, or a new one if it is None, of the size of a view [inch] or for print."""
+    """The given figure, or a new one of the size of a view [inch] or of print."""
     return Figure(figsize=size_of(size)) if figure is None else figure
 
 
@@ -215,13 +202,7 @@ def side_by_side(
 
 
 def save(figure: Canvas, path: Path) -> None:
-    """Save a figure; of a part of one, the whole figure.
-
-    Raises
-    ------
-    FileError
-        If it cannot be written, or its ending is no known format.
-    """
+    """Save a figure; of a part of one, the whole figure."""
     whole = figure if isinstance(figure, Figure) else figure.figure
     with written_whole(path) as part, styled():
         whole.savefig(part)

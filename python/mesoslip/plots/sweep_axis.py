@@ -1,18 +1,18 @@
-"""Axes of pictures of sweeps: swept keys."""
+"""Axes of pictures of sweeps: swept keys, and the two directions along one of them."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from mesoslip.configuration.units import from_cf_units
+from mesoslip.plots.key_names import name_of
 from mesoslip.plots.logarithmic import logarithmic
-from mesoslip.plots.names import name_of
-from mesoslip.plots.style import axes_width, characters
+from mesoslip.plots.style import BLUE, RED, axes_width, characters
 from mesoslip.quantities import Scale, number, scale_for
 
 if TYPE_CHECKING:
@@ -20,11 +20,18 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+# Dimension of the directions, up and down again.
+DIRECTION = "direction"
+# Colours, markers and sizes of the directions, so that both are visible where they agree.
+DIRECTION_STYLES: dict[str, dict[str, Any]] = {
+    "up": {"color": RED, "marker": "^", "markersize": 6},
+    "down": {"color": BLUE, "marker": "v", "markersize": 4},
+}
 # Keys whose values span more than this factor have a logarithmic axis.
 LOGARITHMIC_RANGE = 5.0
 # Measures that span more than this factor have logarithmic colours and axes.
 LOGARITHMIC_MEASURE = 30.0
-# Share of the width of a map that its bar of colours takes.
+# Share of the width of a map that its colour bar takes.
 COLOR_BAR = 0.4
 # Values of an axis of a map up to which each has a label.
 MAX_LABELS = 8
@@ -34,16 +41,7 @@ MAX_LABELS = 8
 class SweptKey:
     """An axis of a swept key: its label, and its values in the unit of the label.
 
-    Attributes
-    ----------
-    label
-        The key and its unit.
-    values
-        The values; 0, 1, 2, ... for words.
-    words
-        The words; empty for numbers.
-    is_logarithmic
-        Whether the axis is logarithmic.
+    The values of a key of words are 0, 1, 2, ...; that of numbers has no words.
     """
 
     label: str
@@ -60,9 +58,8 @@ class SweptKey:
             return cls(name_of(str(coordinate.name)), positions, tuple(map(str, values)), False)
         scale = scale_of(coordinate)
         is_wide = np.min(values) > 0 and np.max(values) > LOGARITHMIC_RANGE * np.min(values)
-        return cls(
-            scale.label(name_of(str(coordinate.name))), values / scale.size, (), bool(is_wide)
-        )
+        label = scale.label(name_of(str(coordinate.name)))
+        return cls(label, values / scale.size, (), bool(is_wide))
 
     @property
     def order(self) -> NDArray[np.intp]:
@@ -123,7 +120,7 @@ def spans_decades(values: Array) -> bool:
 
 
 def scale_of(data: xr.DataArray) -> Scale:
-    """The unit that suits a key or a measure."""
+    """The unit that suits the values of a key or a measure."""
     values = np.abs(data.values[np.isfinite(data.values)])
     unit = from_cf_units(data.attrs.get("units", "1"))
     return scale_for(float(values.max(initial=0.0)), unit)

@@ -10,8 +10,9 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from mesoslip.analysis import avalanches as avalanche_catalogue
 from mesoslip.analysis.avalanche_sizes import fit_power_law
-from mesoslip.plots.lattice import chosen_snapshot, draw_contacts
-from mesoslip.plots.sizes import draw_distribution
+from mesoslip.plots.snapshots import chosen_snapshot
+from mesoslip.plots.views.avalanches import draw_distribution
+from mesoslip.plots.views.lattice import draw_contacts
 from mesoslip.quantities import with_error
 from outputs import configuration
 

@@ -25,7 +25,7 @@ VIEWS: tuple[View, ...] = tuple(
 
 
 def names_of_views(kind: str) -> list[str]:
-    """Names of the views of a kind of output, the default first."""
+    """Names of the views of a kind of output, the default view first."""
     names = {view.name for view in VIEWS if view.kind == kind}
     return sorted(names, key=lambda name: (name != kind, name))
 
@@ -47,7 +47,7 @@ def summary_of_views() -> str:
 
 
 def takes_arrays(tree: Tree, name: str | None) -> bool:
-    """Whether the view of an output needs no xarray."""
+    """Whether the view of an output can be drawn without xarray."""
     return any(
         KINDS[one.kind].is_of(tree)
         for one in VIEWS
@@ -56,15 +56,7 @@ def takes_arrays(tree: Tree, name: str | None) -> bool:
 
 
 def view_of(tree: xr.DataTree, name: str | None, options: Options) -> View:
-    """The view of an output, by default that of its kind.
-
-    Raises
-    ------
-    ConfigError
-        If there is no such view, or it does not have one of the options.
-    FileError
-        If the view is for another kind of output.
-    """
+    """The view of an output, by default that of its kind, which has the options."""
     kind = kind_of(tree)
     there = [one for one in VIEWS if one.kind == kind and one.name == (name or kind)]
     if not there:

@@ -21,21 +21,14 @@ EXTENT = frozenset({"realization", "start, end", "x"})
 
 @dataclass(frozen=True)
 class Options:
-    """Options of views; each view has some of them.
-
-    Attributes
-    ----------
-    extent
-        Realization, window of time and horizontal axis.
-    snapshot
-        Number of a snapshot of the lattice.
-    measure
-        Measure of a sweep.
-    """
+    """Options of views; each view has some of them."""
 
     extent: Extent = EVERYTHING
+    """Realization, window of time and horizontal axis of a run."""
     snapshot: int | None = None
+    """Number of a snapshot of the contacts."""
     measure: str | None = None
+    """Measure of a sweep."""
 
     @property
     def given(self) -> set[str]:
@@ -60,53 +53,63 @@ ComparePanel: TypeAlias = "Callable[[Axes, Sequence[xr.DataTree], Sequence[str],
 
 @dataclass(frozen=True)
 class View:
-    """A picture of one kind of output.
-
-    Attributes
-    ----------
-    name
-        Name by which it is asked for; the default view of a kind has the kind's name.
-    kind
-        Kind of output (`mesoslip.output.kinds.KINDS`).
-    summary
-        Contents of the picture, for messages and help.
-    draw
-        Draws an output into a figure, a new one if it is None.
-    panel
-        Draws the most informative panel alone into axes.
-    options
-        Names of the options it has, as in `Options.given`.
-    compare, compare_panel
-        The same for several outputs with a label each; None if it shows one output only.
-    applies
-        Whether it is for an output, where views of one name are for different outputs of a kind.
-    movie
-        Makes a movie of an output; None if there is none.
-    takes_arrays
-        Whether its pictures need no more of an output than `mesoslip.output.arrays.Arrays` has.
-    """
+    """A picture of one kind of output. Its functions are called with the style of mesoslip set."""
 
     name: str
+    """Name by which it is asked for; the default view of a kind has the name of the kind."""
     kind: str
+    """Kind of output (`mesoslip.output.kinds.KINDS`)."""
     summary: str
-    draw: Draw
+    """Contents of the picture, for messages and help."""
     panel: DrawPanel
+    """Draws the most informative panel into axes."""
+    draw_all: Draw | None = None
+    """Draws all panels into a figure, a new one if it is None; None if there is one panel."""
     options: frozenset[str] = frozenset()
-    compare: Compare | None = None
+    """Names of the options it has, as in `Options.given`."""
     compare_panel: ComparePanel | None = None
+    """Draws a panel of several outputs, each with a label; None if it shows one output only."""
+    compare_all: Compare | None = None
+    """Draws all panels of several outputs; None if there is one."""
+    legend_entries: int = 1
+    """Entries of each output in the legend of a panel of several."""
     applies: Callable[[xr.DataTree], bool] = lambda _: True
+    """Whether it is for an output, where views of one name are for different outputs of a kind."""
     movie: Callable[[xr.DataTree, Options], Movie] | None = None
+    """Makes a movie of an output; None if there is none."""
     takes_arrays: bool = False
+    """Whether `mesoslip.output.arrays.Arrays` has all that it needs of an output."""
+
+    def draw(self, tree: xr.DataTree, options: Options, figure: Canvas | None) -> Canvas:
+        """Draw an output."""
+        with styled():
+            if self.draw_all is not None:
+                return self.draw_all(tree, options, figure)
+            return _single_panel(lambda axes: self.panel(axes, tree, options), 0, figure)
+
+    def compare(
+        self,
+        trees: Sequence[xr.DataTree],
+        labels: Sequence[str],
+        options: Options,
+        figure: Canvas | None,
+    ) -> Canvas:
+        """Draw several outputs, with a legend of their labels."""
+        panel, entries = self.compare_panel, self.legend_entries * len(trees)
+        assert panel is not None
+        with styled():
+            if self.compare_all is not None:
+                return self.compare_all(trees, labels, options, figure)
+            return _single_panel(lambda axes: panel(axes, trees, labels, options), entries, figure)
 
 
-def single_panel(
+def _single_panel(
     draw: Callable[[Axes], None], entries: int, figure: Canvas | None = None
 ) -> Canvas:
-    """A figure of one panel, with a legend of some entries below it."""
-    with styled():
-        figure = canvas(figure, (6.5, 3.2 + 0.16 * entries))
-        axes = figure.subplots()
-        draw(axes)
-        if axes.get_legend_handles_labels()[0]:
-            shared_legend(figure, axes)
+    """A figure of one panel, with its legend, of a number of entries, below it."""
+    figure = canvas(figure, (6.5, 3.2 + 0.16 * entries))
+    axes = figure.subplots()
+    draw(axes)
+    if axes.get_legend_handles_labels()[0]:
+        shared_legend(figure, axes)
     return figure

@@ -14,30 +14,27 @@ from mesoslip.configuration.config import Config
 from mesoslip.configuration.differences import flat, is_bookkeeping
 from mesoslip.configuration.keys import key_kind
 from mesoslip.errors import ConfigError, Problem
-from mesoslip.plots.style import BLUE, Canvas
-from mesoslip.plots.views.base import Options, View, single_panel
+from mesoslip.plots.style import BLUE
+from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import scale_for
 
 if TYPE_CHECKING:
     import xarray as xr
 
-# Key of a single run, or of runs without a difference.
+# Key of a single run, or of runs that do not differ.
 DEFAULT_KEY = "drive.velocity"
-# Ratio of the values from which on their axis is logarithmic.
+# Ratio of the values from which their axis is logarithmic.
 MIN_LOG_RATIO = 5.0
-
-
-def draw(tree: xr.DataTree, options: Options, figure: Canvas | None = None) -> Canvas:
-    """Peaks of a run over the velocity of its drive."""
-    return compare([tree], [""], options, figure)
 
 
 def draw_panel(axes: Axes, tree: xr.DataTree, options: Options) -> None:
     """Draw the peaks of a run over the velocity of its drive."""
-    draw_all(axes, [tree], [""], options)
+    draw_peaks(axes, [tree], [""], options)
 
 
-def draw_all(axes: Axes, trees: Sequence[xr.DataTree], _: Sequence[str], options: Options) -> None:
+def draw_peaks(
+    axes: Axes, trees: Sequence[xr.DataTree], _: Sequence[str], options: Options
+) -> None:
     """Draw the peaks of the second half of each run over the number in which the runs differ."""
     tables = [flat(Config.from_toml(tree.attrs["configuration"])) for tree in trees]
     key = _differing_key(tables)
@@ -56,24 +53,8 @@ def draw_all(axes: Axes, trees: Sequence[xr.DataTree], _: Sequence[str], options
     axes.set_ylabel(up.label("force at the starts of slips"))
 
 
-def compare(
-    trees: Sequence[xr.DataTree],
-    labels: Sequence[str],
-    options: Options,
-    figure: Canvas | None = None,
-) -> Canvas:
-    """Peaks of several runs."""
-    return single_panel(lambda axes: draw_all(axes, trees, labels, options), 0, figure)
-
-
 def _differing_key(tables: Sequence[dict[str, object]]) -> str:
-    """The number in which configurations differ.
-
-    Raises
-    ------
-    ConfigError
-        If it is none, or several.
-    """
+    """The key of a number in which configurations differ, if it is one."""
     keys = [
         key
         for key, value in tables[0].items()
@@ -96,9 +77,8 @@ VIEW = View(
     name="bifurcation",
     kind="run",
     summary="peaks of the force of several runs over the key in which they differ",
-    draw=draw,
     panel=draw_panel,
     options=frozenset({"realization"}),
-    compare=compare,
-    compare_panel=draw_all,
+    compare_panel=draw_peaks,
+    legend_entries=0,
 )

@@ -8,10 +8,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from mesoslip.plots.directions import STYLES
 from mesoslip.plots.logarithmic import logarithmic
-from mesoslip.plots.style import Canvas, canvas, legend_above, styled, titles
-from mesoslip.plots.sweep_axis import SweptKey, scale_of
+from mesoslip.plots.style import Canvas, canvas, legend_above, titles
+from mesoslip.plots.sweep_axis import DIRECTION_STYLES, SweptKey, scale_of
 from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import scale_for
 
@@ -20,28 +19,27 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-# Ratio of the amplitudes of the two directions from which on they are different motions.
+# Ratio of the amplitudes of the two directions from which they are different motions.
 DIFFERENT = 2.0
 IRREGULAR = 2
-# Room above the greatest value, over it.
+# Room above the maximum, as a fraction of it.
 HEADROOM = 0.08
 
 
-def draw(tree: xr.DataTree, options: Options, figure: Canvas | None = None) -> Canvas:
+def draw(tree: xr.DataTree, options: Options, figure: Canvas | None) -> Canvas:
     """Amplitude and period of the settled motion over the parameter."""
     data, axis = _data(tree)
-    with styled():
-        figure = canvas(figure, (6.5, 5.0))
-        amplitude, period = figure.subplots(2, 1, sharex=True, height_ratios=[1.6, 1])
-        draw_amplitude(amplitude, tree, options)
-        amplitude.set_xlabel("")
-        values = data["period"].values
-        scale = scale_for(float(np.nanmax(values, initial=0.0)) or 1.0, "s")
-        for row, (_, style) in enumerate(STYLES.items()):
-            period.plot(axis.values, values[row] / scale.size, linestyle="", **style)
-        period.set_ylabel(scale.label("period"))
-        _begin_at_zero(period, values / scale.size)
-        period.set_xlabel(axis.label)
+    figure = canvas(figure, (6.5, 5.0))
+    amplitude, period = figure.subplots(2, 1, sharex=True, height_ratios=[1.6, 1])
+    draw_amplitude(amplitude, tree, options)
+    amplitude.set_xlabel("")
+    values = data["period"].values
+    scale = scale_for(float(np.nanmax(values, initial=0.0)) or 1.0, "s")
+    for row, (_, style) in enumerate(DIRECTION_STYLES.items()):
+        period.plot(axis.values, values[row] / scale.size, linestyle="", **style)
+    period.set_ylabel(scale.label("period"))
+    _begin_at_zero(period, values / scale.size)
+    period.set_xlabel(axis.label)
     return figure
 
 
@@ -49,7 +47,7 @@ def draw_amplitude(axes: Axes, tree: xr.DataTree, _: Options) -> None:
     """Draw the amplitude over the parameter, with the linear boundary and hysteresis."""
     data, axis = _data(tree)
     ratio, motion = data["amplitude_ratio"].values, data["motion"].values
-    for row, (direction, style) in enumerate(STYLES.items()):
+    for row, (direction, style) in enumerate(DIRECTION_STYLES.items()):
         axes.plot(axis.values, ratio[row], linewidth=0.7, label=direction, **style)
         irregular = motion[row] == IRREGULAR
         axes.plot(
@@ -76,7 +74,7 @@ def draw_amplitude(axes: Axes, tree: xr.DataTree, _: Options) -> None:
 
 
 def _begin_at_zero(axes: Axes, values: Array) -> None:
-    """Let the axis begin at 0, and end where the marks of the values have room."""
+    """Begin the axis at 0, and leave room above the maximum."""
     axes.set_ylim(0, (1 + HEADROOM) * float(np.nanmax(values, initial=0.0)) or None)
 
 
@@ -116,9 +114,9 @@ def _mark_boundary(axes: Axes, values: Array, growth: Array) -> None:
 
 
 def _mark_ends(axes: Axes, data: xr.Dataset) -> None:
-    """Mark where oscillations end in smooth sliding, up to the amplitude just before."""
+    """Mark where oscillations end in smooth sliding, up to their last amplitude."""
     scale = scale_of(data[data.attrs["continued_key"]])
-    styles = list(STYLES.values())
+    styles = list(DIRECTION_STYLES.values())
     for end in range(data.sizes["end"]):
         one = data.isel(end=end)
         value = (one["end_value"].item() + one["end_beyond"].item()) / 2 / scale.size
@@ -135,6 +133,6 @@ VIEW = View(
     name="branches",
     kind="branches",
     summary="amplitude and period over the parameter",
-    draw=draw,
+    draw_all=draw,
     panel=draw_amplitude,
 )

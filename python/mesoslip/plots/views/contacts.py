@@ -1,4 +1,4 @@
-"""View of the stretches of the contacts at a snapshot, with their thresholds and what breaks."""
+"""View of the stretches of contacts at a snapshot, with their thresholds, and which break next."""
 
 from __future__ import annotations
 
@@ -11,10 +11,14 @@ from matplotlib.patches import StepPatch
 from numpy.typing import NDArray
 
 from mesoslip.output.access import config_of
-from mesoslip.plots.lattice import chosen_snapshot
-from mesoslip.plots.lattice_movie import draw_time_bar, snapshot_frames, snapshots_of
 from mesoslip.plots.movie import Movie
-from mesoslip.plots.style import BLUE, RED, Canvas, canvas, legend_above, legend_rows, styled
+from mesoslip.plots.snapshots import (
+    chosen_snapshot,
+    draw_time_bar,
+    snapshot_frames,
+    snapshots_of,
+)
+from mesoslip.plots.style import BLUE, RED, Canvas, canvas, legend_above, legend_rows
 from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import scale_for, with_unit
 
@@ -24,14 +28,14 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 BINS = 80
-# Stretches differ from the displacement of the slider by rounding, relative to them.
+# Relative rounding errors of stretches and displacements.
 ROUNDING = 1e-9
 # Loads below which a threshold does not follow from stretch and load.
 MIN_LOAD = 1e-6
 
 
 def breaking(before: xr.Dataset, after: xr.Dataset | None) -> NDArray[np.bool_]:
-    """Which pinned contacts break between two snapshots: they do not stretch with the slider."""
+    """Which pinned contacts break before a later snapshot: they do not stretch with the slider."""
     stretch = before["stretch"].values.ravel()
     if after is None:
         return np.zeros(stretch.shape, dtype=bool)
@@ -44,8 +48,7 @@ def breaking(before: xr.Dataset, after: xr.Dataset | None) -> NDArray[np.bool_]:
 
 
 def thresholds(tree: xr.DataTree, snapshot: xr.Dataset) -> Array | None:
-    """Stretches at which the pinned contacts of a snapshot break [m]; None if their neighbours
-    have a share in it."""
+    """Stretches at which the pinned contacts of a snapshot break [m]; None with interaction."""
     if config_of(tree).contact_kind.has_neighbours:
         return None
     stretch, load = snapshot["stretch"].values.ravel(), snapshot["load"].values.ravel()
@@ -55,7 +58,7 @@ def thresholds(tree: xr.DataTree, snapshot: xr.Dataset) -> Array | None:
 
 
 class _Histogram:
-    """A histogram of stretches in axes that stay."""
+    """A histogram of stretches, for one snapshot after another."""
 
     def __init__(self, axes: Axes, tree: xr.DataTree, data: xr.Dataset) -> None:
         self.tree, self.axes = tree, axes
@@ -81,13 +84,13 @@ class _Histogram:
             label = "mean threshold without neighbours"
             axes.axvline(mean / self.scale.size, color="black", linestyle="--", label=label)
         highest = 1
-        for index in range(data.sizes["snapshot"]):
-            highest = max(highest, *self._counts(data["stretch"].values[index].ravel()))
+        for index, stretch in enumerate(data["stretch"].values):
+            highest = max(highest, *self._counts(stretch.ravel()))
             limits = thresholds(tree, data.isel(snapshot=index))
             if limits is not None:
                 highest = max(highest, *self._counts(limits))
         axes.set_xlim(edges[0], edges[-1])
-        # Few contacts that break are visible beside many that do not.
+        # A few contacts that break are visible beside many that do not.
         axes.set_yscale("symlog", linthresh=10)
         axes.set_ylim(0, 1.5 * highest)
         axes.set_xlabel(self.scale.label("stretch"))
@@ -128,11 +131,10 @@ def _panel(axes: Axes, tree: xr.DataTree, options: Options) -> None:
     _Histogram(axes, tree, data.isel(snapshot=[index])).show(snapshot, later)
 
 
-def draw(tree: xr.DataTree, options: Options, figure: Canvas | None = None) -> Canvas:
+def draw(tree: xr.DataTree, options: Options, figure: Canvas | None) -> Canvas:
     """Stretches of the contacts at a snapshot."""
-    with styled():
-        figure = canvas(figure, (4.4, 3.2))
-        _panel(figure.subplots(), tree, options)
+    figure = canvas(figure, (4.4, 3.2))
+    _panel(figure.subplots(), tree, options)
     return figure
 
 
@@ -159,7 +161,7 @@ VIEW = View(
     name="contacts",
     kind="run",
     summary="stretches of the contacts with their thresholds, at a snapshot; movie",
-    draw=draw,
+    draw_all=draw,
     panel=_panel,
     options=frozenset({"snapshot"}),
     movie=movie,

@@ -18,10 +18,9 @@ from mesoslip.plots.style import (
     curve_color,
     curve_style,
     legend_above,
-    styled,
     titles,
 )
-from mesoslip.plots.views.base import Options, View, single_panel
+from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import Scale, scale_for, with_unit
 
 if TYPE_CHECKING:
@@ -30,30 +29,29 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-def draw(tree: xr.DataTree, options: Options, figure: Canvas | None = None) -> Canvas:
+def draw(tree: xr.DataTree, options: Options, figure: Canvas | None) -> Canvas:
     """Force and slope of the master equation over displacement, with the point of instability."""
     spring = config_of(tree).series_stiffness
     x, _ = _units([tree])
     data = tree.to_dataset()
     values: Array = data["slope"].values
     scale = scale_for(float(np.max(np.abs(values))), "N/m")
-    with styled():
-        figure = canvas(figure, (6.5, 4.6))
-        force, slope = figure.subplots(2, 1, sharex=True, height_ratios=[1.6, 1])
-        draw_curve(force, tree, options)
-        force.set_xlabel("")
-        slope.plot(data["displacement"].values / x.size, values / scale.size, color="black")
-        slope.set_ylabel(scale.label("slope $F'$"))
-        slope.set_xlabel(x.label("displacement $X$"))
-        _mark_instability(slope, tree, x)
-        if np.isfinite(spring):
-            slope.axhline(
-                -spring / scale.size,
-                color=RED,
-                linestyle="--",
-                label="$-K$: unstable below this line",
-            )
-            legend_above(slope)
+    figure = canvas(figure, (6.5, 4.6))
+    force, slope = figure.subplots(2, 1, sharex=True, height_ratios=[1.6, 1])
+    draw_curve(force, tree, options)
+    force.set_xlabel("")
+    slope.plot(data["displacement"].values / x.size, values / scale.size, color="black")
+    slope.set_ylabel(scale.label("slope $F'$"))
+    slope.set_xlabel(x.label("displacement $X$"))
+    _mark_instability(slope, tree, x)
+    if np.isfinite(spring):
+        slope.axhline(
+            -spring / scale.size,
+            color=RED,
+            linestyle="--",
+            label="$-K$: unstable below this line",
+        )
+        legend_above(slope)
     return figure
 
 
@@ -118,7 +116,7 @@ def draw_curves(
 
 
 def _units(trees: Sequence[xr.DataTree]) -> tuple[Scale, Scale]:
-    """Units of displacement and force in which curves are best read."""
+    """Units of displacement and force that suit all of some curves."""
     data = [tree.to_dataset() for tree in trees]
     x = max(float(one["displacement"].values[-1]) for one in data)
     force = max(float(np.max(np.abs(one["contact_force"].values))) for one in data)
@@ -126,27 +124,16 @@ def _units(trees: Sequence[xr.DataTree]) -> tuple[Scale, Scale]:
 
 
 def _mark_instability(axes: Axes, tree: xr.DataTree, scale: Scale) -> None:
-    """Mark X_c along the whole height of axes."""
+    """Mark X_c over the height of axes."""
     if "X_c" in tree.attrs:
         axes.axvline(tree.attrs["X_c"] / scale.size, color=RED, linewidth=0.7, alpha=0.6, zorder=0)
-
-
-def compare(
-    trees: Sequence[xr.DataTree],
-    labels: Sequence[str],
-    options: Options,
-    figure: Canvas | None = None,
-) -> Canvas:
-    """Several force curves over each other."""
-    return single_panel(lambda axes: draw_curves(axes, trees, labels, options), len(trees), figure)
 
 
 VIEW = View(
     name="curve",
     kind="curve",
     summary="force and its slope over displacement",
-    draw=draw,
+    draw_all=draw,
     panel=draw_curve,
-    compare=compare,
     compare_panel=draw_curves,
 )

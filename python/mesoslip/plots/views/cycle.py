@@ -15,31 +15,29 @@ from mesoslip.plots.style import (
     canvas,
     curve_style,
     legend_above,
-    styled,
     titles,
 )
-from mesoslip.plots.views.base import Options, View, single_panel
+from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import Scale, scale_for, with_unit
 
 if TYPE_CHECKING:
     import xarray as xr
 
 
-def draw(tree: xr.DataTree, options: Options, figure: Canvas | None = None) -> Canvas:
+def draw(tree: xr.DataTree, options: Options, figure: Canvas | None) -> Canvas:
     """Forces, and the velocity of the slider, over a cycle."""
     data = tree["trace"].to_dataset()
     time, _ = _units([tree])
     speed = scale_for(_largest(data["velocity"].values), "m/s")
-    with styled():
-        figure = canvas(figure, (6.5, 4.6))
-        force, velocity = figure.subplots(2, 1, sharex=True, height_ratios=[1.6, 1])
-        draw_forces(force, tree, options)
-        force.set_xlabel("")
-        velocity.plot(
-            data["time"].values / time.size, data["velocity"].values / speed.size, color="black"
-        )
-        velocity.set_ylabel(speed.label("velocity $V$"))
-        velocity.set_xlabel(time.label("time from the section"))
+    figure = canvas(figure, (6.5, 4.6))
+    force, velocity = figure.subplots(2, 1, sharex=True, height_ratios=[1.6, 1])
+    draw_forces(force, tree, options)
+    force.set_xlabel("")
+    velocity.plot(
+        data["time"].values / time.size, data["velocity"].values / speed.size, color="black"
+    )
+    velocity.set_ylabel(speed.label("velocity $V$"))
+    velocity.set_xlabel(time.label("time from the section"))
     return figure
 
 
@@ -73,16 +71,6 @@ def draw_cycles(
     axes.set_xlabel(time.label("time from the section"))
 
 
-def compare(
-    trees: Sequence[xr.DataTree],
-    labels: Sequence[str],
-    options: Options,
-    figure: Canvas | None = None,
-) -> Canvas:
-    """Several cycles over each other."""
-    return single_panel(lambda axes: draw_cycles(axes, trees, labels, options), len(trees), figure)
-
-
 def _summary(tree: xr.DataTree) -> str:
     """The motion, its period and its leading multiplier."""
     motion = str(tree.attrs["settled_motion"])
@@ -94,7 +82,7 @@ def _summary(tree: xr.DataTree) -> str:
 
 
 def _units(trees: Sequence[xr.DataTree]) -> tuple[Scale, Scale]:
-    """Units of time and force in which cycles are best read."""
+    """Units of time and force that suit all of some cycles."""
     data = [tree["trace"].to_dataset() for tree in trees]
     time = max(_largest(one["time"].values) for one in data)
     force = max(_largest(one["contact_force"].values) for one in data)
@@ -102,7 +90,7 @@ def _units(trees: Sequence[xr.DataTree]) -> tuple[Scale, Scale]:
 
 
 def _largest(values: np.ndarray) -> float:
-    """Maximum of the absolute values; 1 of none."""
+    """Maximum of the absolute values; 1 if all are 0."""
     return float(np.max(np.abs(values), initial=0.0)) or 1.0
 
 
@@ -110,8 +98,7 @@ VIEW = View(
     name="cycle",
     kind="cycle",
     summary="forces and velocity over a cycle",
-    draw=draw,
+    draw_all=draw,
     panel=draw_forces,
-    compare=compare,
     compare_panel=draw_cycles,
 )

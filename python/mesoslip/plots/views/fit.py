@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from mesoslip.configuration.units import from_cf_units
 from mesoslip.output.access import trace_suffixes
+from mesoslip.plots.key_names import symbol_or_name
 from mesoslip.plots.lines import max_size
-from mesoslip.plots.names import symbol_or_name
 from mesoslip.plots.printing import UNLETTERED, current, is_narrow
-from mesoslip.plots.style import BLUE, Canvas, canvas, legend_above, plain, styled
+from mesoslip.plots.style import BLUE, Canvas, canvas, legend_above, plain
 from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import Scale, scale_for
 
@@ -28,36 +28,35 @@ MEASURED = "black"
 PREDICTED = BLUE
 # Bins of the histograms of slips.
 BINS = 16
-# Draws of a pair of parameters that are shown.
+# Maximum number of draws of a pair of parameters that are shown.
 MAX_POINTS = 1500
 
 
-def draw(tree: xr.DataTree, _: Options, figure: Canvas | None = None) -> Canvas:
+def draw(tree: xr.DataTree, _: Options, figure: Canvas | None) -> Canvas:
     """Pairs of parameters, the measured and predicted traces, and distributions of their slips."""
-    with styled():
-        names = list(tree["posterior"].data_vars)
-        size, traces = max(2, len(names)), trace_suffixes(tree)
-        is_stacked = is_narrow(figure)
-        heights = [1.25 * size, *(4.5 if is_stacked else 2.6 for _ in traces)]
-        figure = canvas(figure, (3.4 if is_stacked else 7.0, sum(heights)))
-        rows, columns = (4, 1) if is_stacked else (2, 3)
-        whole = figure.add_gridspec(1 + len(traces), 1, height_ratios=heights)
-        _pairs(figure, whole[0], tree)
-        for number, after in enumerate(traces, 1):
-            below = whole[number].subgridspec(rows, columns, height_ratios=[1.2] + [1] * (rows - 1))
-            axes = figure.add_subplot(below[0, :])
-            _draw_one(axes, tree, after)
-            if len(traces) > 1:
-                axes.set_title(plain(tree[f"observed_data{after}"].attrs["title"]), loc="left")
-            places = [below[place] for place in np.ndindex(rows, columns) if place[0]]
-            _slips(figure, places, tree, after)
-        if current().title is None:
-            figure.suptitle(plain(tree.attrs.get("title", "")), x=0.01, ha="left")
+    names = list(tree["posterior"].data_vars)
+    size, traces = max(2, len(names)), trace_suffixes(tree)
+    is_stacked = is_narrow(figure)
+    heights = [1.25 * size, *(4.5 if is_stacked else 2.6 for _ in traces)]
+    figure = canvas(figure, (3.4 if is_stacked else 7.0, sum(heights)))
+    rows, columns = (4, 1) if is_stacked else (2, 3)
+    whole = figure.add_gridspec(1 + len(traces), 1, height_ratios=heights)
+    _pairs(figure, whole[0], tree)
+    for number, after in enumerate(traces, 1):
+        below = whole[number].subgridspec(rows, columns, height_ratios=[1.2] + [1] * (rows - 1))
+        axes = figure.add_subplot(below[0, :])
+        _draw_one(axes, tree, after)
+        if len(traces) > 1:
+            axes.set_title(plain(tree[f"observed_data{after}"].attrs["title"]), loc="left")
+        places = [below[place] for place in np.ndindex(rows, columns) if place[0]]
+        _slips(figure, places, tree, after)
+    if current().title is None:
+        figure.suptitle(plain(tree.attrs.get("title", "")), x=0.01, ha="left")
     return figure
 
 
 def _scale(draws: xr.DataArray) -> Scale:
-    """The unit of a parameter: that of its median."""
+    """The unit that suits the median of a parameter."""
     return scale_for(float(np.median(np.abs(draws.values))), from_cf_units(draws.attrs["units"]))
 
 
@@ -67,7 +66,7 @@ def _label(name: str, scale: Scale) -> str:
 
 
 def _pairs(figure: Canvas, place: object, tree: xr.DataTree) -> None:
-    """Draw pairs of parameters; on the diagonal the density of each with that of its prior."""
+    """Draw pairs of parameters, and on the diagonal the density of each with that of its prior."""
     group, prior = tree["posterior"].to_dataset(), tree["prior"].to_dataset()
     names = [str(name) for name in group.data_vars]
     grid = place.subgridspec(len(names), len(names))  # type: ignore[attr-defined]
@@ -91,7 +90,6 @@ def _pairs(figure: Canvas, place: object, tree: xr.DataTree) -> None:
                 axes.set_ylim(*np.percentile(draws[below], [0.1, 99.9]))
             axes.set_xlim(low, high)
             axes.tick_params(labelsize="x-small")
-            # Whole numbers on ticks, not differences from an offset.
             for axis in (axes.xaxis, axes.yaxis):
                 axis.set_major_formatter(_formatter())
                 axis.set_major_locator(MaxNLocator(3, prune="both"))
@@ -108,19 +106,19 @@ def _pairs(figure: Canvas, place: object, tree: xr.DataTree) -> None:
 
 
 def _formatter() -> ScalarFormatter:
-    """Ticks without an offset."""
+    """Labels of ticks with whole numbers, not differences from an offset."""
     formatter = ScalarFormatter(useOffset=False)
     formatter.set_powerlimits((-3, 5))
     return formatter
 
 
 def draw_trace(axes: Axes, tree: xr.DataTree, _: Options) -> None:
-    """Draw the measured trace over the band of predicted ones; of several traces the first."""
+    """Draw the measured trace, the first of several, over the band of predicted ones."""
     _draw_one(axes, tree, "")
 
 
 def _draw_one(axes: Axes, tree: xr.DataTree, after: str) -> None:
-    """Draw one of the measured traces, whose groups have names with a suffix."""
+    """Draw a measured trace, whose groups have names with a suffix."""
     observed = tree[f"observed_data{after}"].to_dataset()["spring_force"]
     predicted = tree[f"posterior_predictive{after}"].to_dataset()["spring_force"]
     scale = scale_for(max_size(observed.values, predicted.values), "N")
@@ -144,7 +142,7 @@ def _draw_one(axes: Axes, tree: xr.DataTree, after: str) -> None:
 
 
 def _slips(figure: Canvas, places: Sequence[Any], tree: xr.DataTree, after: str) -> None:
-    """Draw distributions of the slips after the first one of each trace."""
+    """Draw distributions of the slips, without the first one of each trace."""
     groups = [tree[f"{name}{after}"].to_dataset() for name in ("observed_slips", "predicted_slips")]
     parts = [_later(group) for group in groups]
     quantities = (("force before slips", "N"), ("force drop", "N"), ("waiting time", "s"))
@@ -158,10 +156,7 @@ def _slips(figure: Canvas, places: Sequence[Any], tree: xr.DataTree, after: str)
             edges = np.linspace(low, high if high > low else low + 1, BINS + 1)
             for values, style in (
                 (predicted, {"color": PREDICTED, "alpha": 0.35, "label": "predicted"}),
-                (
-                    measured,
-                    {"histtype": "step", "color": MEASURED, "label": "measured"},
-                ),
+                (measured, {"histtype": "step", "color": MEASURED, "label": "measured"}),
             ):
                 if values.size:
                     axes.hist(
@@ -180,7 +175,7 @@ def _slips(figure: Canvas, places: Sequence[Any], tree: xr.DataTree, after: str)
 
 
 def _later(group: xr.Dataset) -> tuple[Array, Array, Array]:
-    """Force before, drop, and waiting time of the slips after the first one of each trace."""
+    """Force before, drop, and waiting time of the slips, without the first one of each trace."""
     owner, start = group["trace"].values, group["start_time"].values
     later = np.diff(owner, prepend=-1) == 0
     before, after = group["force_before"].values, group["force_after"].values
@@ -192,6 +187,6 @@ VIEW = View(
     name="fit",
     kind="fit",
     summary="parameters, and predicted traces beside the measured one",
-    draw=draw,
+    draw_all=draw,
     panel=draw_trace,
 )

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from mesoslip.output.access import trace_suffixes
 from mesoslip.plots.lines import max_size
 from mesoslip.plots.printing import is_narrow
-from mesoslip.plots.style import BLUE, RED, Canvas, canvas, legend_above, plain, styled
+from mesoslip.plots.style import BLUE, RED, Canvas, canvas, legend_above, plain
 from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import scale_for
 
@@ -22,34 +22,33 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 MEASURED, PREDICTED, WORST = "black", BLUE, RED
-# Summaries that are listed, and deviation at which they end [spreads].
+# Maximum number of summaries that are listed, and end of their axis [spreads].
 LISTED = 14
 MAX_SCORE = 30.0
-# Mean times between slips of an excerpt.
+# Length of an excerpt in mean times between slips.
 CYCLES = 5
 # Characters in a line of the title of a wide figure.
 WIDTH = 115
 
 
-def draw(tree: xr.DataTree, _: Options, figure: Canvas | None = None) -> Canvas:
+def draw(tree: xr.DataTree, _: Options, figure: Canvas | None) -> Canvas:
     """Excerpts of measured and predicted traces, the shapes of slips, and the worst summaries."""
     suffixes = trace_suffixes(tree)
-    with styled():
-        is_stacked = is_narrow(figure)
-        heights = [*(4.0 if is_stacked else 1.9 for _ in suffixes), 3.4 if is_stacked else 3.0]
-        figure = canvas(figure, (3.4 if is_stacked else 7.0, 0.6 + sum(heights)))
-        rows = figure.add_gridspec(len(heights), 1, height_ratios=heights)
-        for number, after in enumerate(suffixes):
-            pair = (
-                rows[number].subgridspec(2, 1)
-                if is_stacked
-                else rows[number].subgridspec(1, 2, width_ratios=[1.7, 1])
-            )
-            _excerpt(figure.add_subplot(pair[0]), tree, after, named=len(suffixes) > 1)
-            _shape(figure.add_subplot(pair[1]), tree, number)
-        draw_scores(figure.add_subplot(rows[len(suffixes)]), tree, Options())
-        characters = 55 if is_stacked else WIDTH
-        figure.suptitle(_title(tree, characters), x=0.01, ha="left", fontsize=8)
+    is_stacked = is_narrow(figure)
+    heights = [*(4.0 if is_stacked else 1.9 for _ in suffixes), 3.4 if is_stacked else 3.0]
+    figure = canvas(figure, (3.4 if is_stacked else 7.0, 0.6 + sum(heights)))
+    rows = figure.add_gridspec(len(heights), 1, height_ratios=heights)
+    for number, after in enumerate(suffixes):
+        pair = (
+            rows[number].subgridspec(2, 1)
+            if is_stacked
+            else rows[number].subgridspec(1, 2, width_ratios=[1.7, 1])
+        )
+        _excerpt(figure.add_subplot(pair[0]), tree, after, named=len(suffixes) > 1)
+        _shape(figure.add_subplot(pair[1]), tree, number)
+    draw_scores(figure.add_subplot(rows[len(suffixes)]), tree, Options())
+    characters = 55 if is_stacked else WIDTH
+    figure.suptitle(_title(tree, characters), x=0.01, ha="left", fontsize=8)
     return figure
 
 
@@ -63,7 +62,7 @@ def _title(tree: xr.DataTree, characters: int) -> str:
 
 
 def _excerpt(axes: Axes, tree: xr.DataTree, after: str, *, named: bool) -> None:
-    """Draw some cycles of the measured trace, and of a predicted one from a slip of its own."""
+    """Draw some cycles of the measured trace and of a predicted one, each from one of its slips."""
     observed = tree[f"observed_data{after}"].to_dataset()["spring_force"]
     predicted = tree[f"posterior_predictive{after}"].to_dataset()["spring_force"]
     slips = tree[f"observed_slips{after}"].to_dataset()
@@ -103,7 +102,7 @@ def _excerpt(axes: Axes, tree: xr.DataTree, after: str, *, named: bool) -> None:
 
 
 def _shape(axes: Axes, tree: xr.DataTree, number: int) -> None:
-    """Draw the mean force along slips, measured and predicted."""
+    """Draw the mean force during slips, measured and predicted."""
     data = tree["summaries"].to_dataset()
     names = [str(one) for one in data["summary"].values]
     chosen = [
@@ -132,7 +131,7 @@ def _shape(axes: Axes, tree: xr.DataTree, number: int) -> None:
 
 
 def draw_scores(axes: Axes, tree: xr.DataTree, _: Options) -> None:
-    """Draw the summaries that are farthest from the predictions, with the 90 % of these."""
+    """Draw the summaries that are farthest from their predictions, with 90 % of these."""
     data = tree["summaries"].to_dataset()
     scores = data["score"].values
     labels = [str(one) for one in data["label"].values]
@@ -183,6 +182,6 @@ VIEW = View(
     name="misfit",
     kind="fit",
     summary="where the traces disagree with the predictions",
-    draw=draw,
+    draw_all=draw,
     panel=draw_scores,
 )

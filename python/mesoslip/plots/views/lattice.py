@@ -2,56 +2,216 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import math
+from typing import TYPE_CHECKING, Any
 
+import matplotlib as mpl
+import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.collections import PolyCollection
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
-from mesoslip.plots.lattice import (
-    BESIDE_LATTICE,
-    OVER_LATTICE,
-    chosen_lattice,
-    draw_generations,
-    draw_load,
-    lattice_size,
-)
-from mesoslip.plots.lattice_movie import lattice_movie
+from mesoslip.errors import FileError
+from mesoslip.plots.movie import MAX_FRAMES, Movie, time_bar
 from mesoslip.plots.printing import is_narrow
-from mesoslip.plots.style import Canvas, canvas, styled
+from mesoslip.plots.snapshots import (
+    chosen_snapshot,
+    draw_time_bar,
+    is_on_lattice,
+    snapshot_frames,
+    snapshots_of,
+)
+from mesoslip.plots.style import Canvas, canvas
 from mesoslip.plots.views.base import Options, View
+from mesoslip.quantities import with_unit
 
 if TYPE_CHECKING:
     import xarray as xr
 
+Array = NDArray[np.float64]
 
-def draw(tree: xr.DataTree, options: Options, figure: Canvas | None = None) -> Canvas:
+# Maximum number of contacts that are drawn as polygons; more of them become an image.
+MAX_POLYGONS = 20_000
+# Width of a lattice in a picture, or its height if that is larger [inch].
+LATTICE_WIDTH = 2.6
+# Width of the colours beside a lattice, and height of the title over it [inch].
+BESIDE_LATTICE, OVER_LATTICE = 1.0, 0.45
+# Height of the axes of the time below a lattice, with their labels [inch].
+TIME_HEIGHT = 1.0
+# Colour of missing values.
+BLANK = "0.93"
+
+
+def draw(tree: xr.DataTree, options: Options, figure: Canvas | None) -> Canvas:
     """Force over threshold of each contact, and generations of the avalanche before."""
-    snapshot = chosen_lattice(tree, options.snapshot)
+    snapshot = _chosen_lattice(tree, options)
     size = snapshot["avalanche_size"].item()
-    with styled():
-        count = 2 if size else 1
-        width, height = lattice_size(snapshot)
-        rows, columns = (count, 1) if is_narrow(figure) else (1, count)
-        whole = columns * (width + BESIDE_LATTICE), rows * (height + OVER_LATTICE)
-        figure = canvas(figure, whole)
-        panels = figure.subplots(rows, columns, squeeze=False).ravel()
-        draw_load(panels[0], snapshot)
-        if size:
-            draw_generations(panels[1], snapshot)
-            panels[1].set_title(f"avalanche of size {size}", loc="left")
+    count = 2 if size else 1
+    width, height = _lattice_size(snapshot)
+    rows, columns = (count, 1) if is_narrow(figure) else (1, count)
+    whole = columns * (width + BESIDE_LATTICE), rows * (height + OVER_LATTICE)
+    figure = canvas(figure, whole)
+    panels = figure.subplots(rows, columns, squeeze=False).ravel()
+    _draw_load(panels[0], snapshot)
+    if size:
+        _draw_generations(panels[1], snapshot)
+        panels[1].set_title(f"avalanche of size {size}", loc="left")
     return figure
 
 
 def draw_panel(axes: Axes, tree: xr.DataTree, options: Options) -> None:
     """Draw the force over threshold of each contact."""
-    draw_load(axes, chosen_lattice(tree, options.snapshot))
+    _draw_load(axes, _chosen_lattice(tree, options))
+
+
+def movie(tree: xr.DataTree, options: Options) -> Movie:
+    """An avalanche that spreads, or the snapshots one after another with a bar of time."""
+    snapshot = _chosen_lattice(tree, options)
+    if snapshot["avalanche_size"].item():
+        return _spreading(snapshot)
+    return _snapshots(tree, snapshot)
+
+
+def _chosen_lattice(tree: xr.DataTree, options: Options) -> xr.Dataset:
+    snapshot = chosen_snapshot(tree, options.snapshot)
+    if not is_on_lattice(snapshot):
+        raise FileError(
+            "the contacts of the output have no sites, which [interaction] gives them; "
+            '--view contacts (view="contacts") shows their stretches'
+        )
+    return snapshot
+
+
+def draw_contacts(axes: Axes, snapshots: xr.Dataset, values: Array, **style: Any) -> Any:
+    """Draw a value of each contact at its site, shape (rows, columns); NaN in light grey."""
+    style["cmap"] = mpl.colormaps[style["cmap"]].with_extremes(bad=BLANK)
+    x, y = snapshots["x"].values, snapshots["y"].values
+    spacing = x[0, 1] - x[0, 0]
+    axes.set_aspect("equal")
+    axes.set_xticks([])
+    axes.set_yticks([])
+    axes.spines[:].set_visible(False)
+    is_triangular = bool(x[1, 0] > 0.25 * spacing)
+    if values.size > MAX_POLYGONS:
+        height = y[1, 0] - y[0, 0]
+        extent = (0, spacing * values.shape[1], 0, height * values.shape[0])
+        return axes.imshow(values, origin="lower", extent=extent, interpolation="nearest", **style)
+    corners = np.arange(6) / 6 + 1 / 12 if is_triangular else np.arange(4) / 4 + 1 / 8
+    radius = 1.01 * spacing / (2 * np.cos(np.pi / len(corners)))
+    shape = radius * np.stack([np.cos(2 * np.pi * corners), np.sin(2 * np.pi * corners)], axis=1)
+    sites = np.stack([x.ravel(), y.ravel()], axis=1)
+    polygons = PolyCollection(
+        sites[:, None, :] + shape[None, :, :], array=np.ma.masked_invalid(values.ravel()), **style
+    )
+    axes.add_collection(polygons)
+    axes.set_xlim(x.min() - spacing, x.max() + spacing)
+    axes.set_ylim(y.min() - spacing, y.max() + spacing)
+    return polygons
+
+
+def _lattice_size(snapshots: xr.Dataset) -> tuple[float, float]:
+    """Width and height of axes in which the lattice leaves no empty space [inch]."""
+    x, y = snapshots["x"].values, snapshots["y"].values
+    spacing = x[0, 1] - x[0, 0]
+    aspect = (np.ptp(y) + 2 * spacing) / (np.ptp(x) + 2 * spacing)
+    width = LATTICE_WIDTH * min(1.0, 1.0 / aspect)
+    return width, width * aspect
+
+
+def _load_range(load: Array) -> Normalize:
+    """Limits of the colours of loads: from 0, or their negative minimum, to the threshold."""
+    return Normalize(min(0.0, math.floor(10 * np.nanmin(load, initial=0.0)) / 10), 1.0)
+
+
+def _draw_load(axes: Axes, snapshot: xr.Dataset) -> None:
+    """Draw the force over threshold of the contacts of a snapshot."""
+    load = snapshot["load"].values
+    drawn = draw_contacts(axes, snapshot, load, cmap="viridis", norm=_load_range(load))
+    axes.figure.colorbar(drawn, ax=axes, label="force over threshold")
+    time = with_unit(snapshot["snapshot_time"].item(), "s", 6)
+    axes.set_title(f"snapshot at {time}\ngrey: detached", loc="left")
+
+
+def _draw_generations(axes: Axes, snapshot: xr.Dataset) -> None:
+    """Draw the generation in which each contact of an avalanche broke."""
+    generation = snapshot["generation"].values.astype(float)
+    generation[generation == 0] = np.nan
+    norm = Normalize(1, np.nanmax(generation))
+    drawn = draw_contacts(axes, snapshot, generation, cmap="inferno_r", norm=norm)
+    axes.figure.colorbar(drawn, ax=axes, label="generation")
+
+
+def _spreading(snapshot: xr.Dataset) -> Movie:
+    """The avalanche before a snapshot, generation by generation."""
+    generation = snapshot["generation"].values.astype(float)
+    last = int(generation.max())
+    steps = np.unique(np.linspace(0, last, min(MAX_FRAMES, last + 1)).astype(int))
+    broken = np.array([np.count_nonzero((generation > 0) & (generation <= one)) for one in steps])
+    generation[generation == 0] = np.nan
+    figure, axes, below = _panels(snapshot)
+    norm = Normalize(1, max(last, 2))
+    empty = np.full(generation.shape, np.nan)
+    drawn = draw_contacts(axes, snapshot, empty, cmap="inferno_r", norm=norm)
+    figure.colorbar(ScalarMappable(norm, "inferno_r"), ax=axes, label="generation")
+    below.plot(steps, broken, color="black")
+    below.set_xlabel("generation")
+    below.set_ylabel("broken")
+    bar = time_bar(below)
+    time = with_unit(snapshot["snapshot_time"].item(), "s", 6)
+    axes.set_title(f"avalanche at {time}, size {snapshot['avalanche_size'].item()}", loc="left")
+
+    def show(number: int) -> None:
+        _recolor(drawn, np.where(generation <= steps[number], generation, np.nan))
+        bar.set_xdata([steps[number]] * 2)
+
+    return Movie(figure, len(steps), show)
+
+
+def _snapshots(tree: xr.DataTree, snapshot: xr.Dataset) -> Movie:
+    """The snapshots of a realization, above the force over time."""
+    data = snapshots_of(tree, snapshot)
+    frames = snapshot_frames(data)
+    times = data["snapshot_time"].values
+    figure, axes, below = _panels(snapshot)
+    load = data["load"].values
+    norm = _load_range(load)
+    drawn = draw_contacts(axes, snapshot, load[frames[0]], cmap="viridis", norm=norm)
+    label = "force over threshold"
+    figure.colorbar(ScalarMappable(norm, "viridis"), ax=axes, label=label)
+    move = draw_time_bar(below, tree, snapshot, times)
+
+    def show(number: int) -> None:
+        index = frames[number]
+        _recolor(drawn, load[index])
+        axes.set_title(f"{with_unit(times[index], 's', 6)}; grey: detached", loc="left")
+        move(times[index])
+
+    return Movie(figure, len(frames), show)
+
+
+def _panels(snapshot: xr.Dataset) -> tuple[Figure, Axes, Axes]:
+    """A figure with axes for the lattice and, below it, for the time."""
+    width, height = _lattice_size(snapshot)
+    heights = height + OVER_LATTICE, TIME_HEIGHT
+    figure = Figure(figsize=(width + BESIDE_LATTICE, sum(heights)))
+    axes, below = figure.subplots(2, 1, height_ratios=heights)
+    return figure, axes, below
+
+
+def _recolor(drawn: Any, values: Any) -> None:
+    values = np.ma.masked_invalid(values)
+    drawn.set_array(values if values.size > MAX_POLYGONS else values.ravel())
 
 
 VIEW = View(
     name="lattice",
     kind="run",
     summary="contacts on their lattice, at a snapshot; movie",
-    draw=draw,
+    draw_all=draw,
     panel=draw_panel,
     options=frozenset({"snapshot"}),
-    movie=lambda tree, options: lattice_movie(tree, options.snapshot),
+    movie=movie,
 )

@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 
 from mesoslip.errors import FileError
 from mesoslip.output.samples import times_of
-from mesoslip.plots.axis import time_since
+from mesoslip.plots.axis import HorizontalAxis, time_since
 from mesoslip.plots.close_up import largest_slip, slip_window
 from mesoslip.plots.curves import about_realizations, curve, draw_curves
 from mesoslip.plots.extent import Extent
 from mesoslip.plots.lines import max_size
 from mesoslip.plots.movie import Movie, chosen_frames, time_bar
 from mesoslip.plots.printing import is_narrow
-from mesoslip.plots.style import BLUE, SPRING, Canvas, canvas, legend_above, styled, titles
+from mesoslip.plots.style import BLUE, SPRING, Canvas, canvas, legend_above, titles
 from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import scale_for
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-# Instants at which the velocities of layers are drawn.
+# Maximum number of instants at which the velocities of layers are drawn.
 MAX_INSTANTS = 2000
 NO_LAYERS = (
     "the output has no displacements of layers: they are recorded with "
@@ -36,24 +36,18 @@ NO_LAYERS = (
 )
 
 
-def draw(tree: xr.DataTree, options: Options, figure: Canvas | None = None) -> Canvas:
+def draw(tree: xr.DataTree, options: Options, figure: Canvas | None) -> Canvas:
     """Velocities of layers over time, above the forces at both ends of the slider."""
     extent = options.extent
     window = _window(tree, extent)
     near = Extent(extent.first, *window, parts=extent.parts)
-    with styled():
-        figure = canvas(figure, (6.5, 5.0))
-        waves, force = figure.subplots(2, 1, sharex=True, height_ratios=[1.6, 1])
-        draw_waves(waves, tree, options)
-        waves.set_xlabel("")
-        curves = [
-            curve(tree, "contact_force", near, color="black", label="contact force"),
-            curve(tree, "elastic_force", near, color=BLUE, label="mean elastic force"),
-            curve(tree, "spring_force", near, **SPRING | {"label": "force at the drive"}),
-        ]
-        draw_curves(force, curves, "spring_force", time_since(window), "force")
-        # In a column of a journal the colours take the width of a second entry.
-        legend_above(force, columns=1 if is_narrow(figure) else 3)
+    figure = canvas(figure, (6.5, 5.0))
+    waves, force = figure.subplots(2, 1, sharex=True, height_ratios=[1.6, 1])
+    draw_waves(waves, tree, options)
+    waves.set_xlabel("")
+    _draw_forces(force, tree, near, time_since(window), "black")
+    # In a column of a journal the colour bar takes the width of a second entry.
+    legend_above(force, columns=1 if is_narrow(figure) else 3)
     return figure
 
 
@@ -78,8 +72,20 @@ def draw_waves(axes: Axes, tree: xr.DataTree, options: Options) -> None:
     titles(axes, tree, about_realizations(tree, Extent(extent.first)))
 
 
+def _draw_forces(
+    axes: Axes, tree: xr.DataTree, extent: Extent, horizontal: HorizontalAxis, color: str
+) -> None:
+    """Draw the forces at both ends of the slider, that of the contacts in a colour, and inside."""
+    curves = [
+        curve(tree, "contact_force", extent, color=color, label="contact force"),
+        curve(tree, "elastic_force", extent, color=BLUE, label="mean elastic force"),
+        curve(tree, "spring_force", extent, **SPRING | {"label": "force at the drive"}),
+    ]
+    draw_curves(axes, curves, "spring_force", horizontal, "force")
+
+
 def _window(tree: xr.DataTree, extent: Extent) -> tuple[float, float]:
-    """The window of time that was asked for, by default around the largest slip."""
+    """The window of time of the options, by default around the largest slip."""
     if "layer_displacement" not in tree.data_vars:
         raise FileError(NO_LAYERS)
     slip = largest_slip(tree, extent)
@@ -93,13 +99,8 @@ def _window(tree: xr.DataTree, extent: Extent) -> tuple[float, float]:
 def layer_motion(
     tree: xr.DataTree, extent: Extent, window: tuple[float, float]
 ) -> tuple[Array, Array]:
-    """Times [s], shape (T + 1), and mean velocities of the layers between them, shape (T, layers).
-
-    Raises
-    ------
-    FileError
-        If there are not two samples in the window.
-    """
+    """Times [s], shape (T + 1), and mean velocities of the layers between them [m/s], shape
+    (T, layers)."""
     times = times_of(tree)
     first, after = np.searchsorted(times, window[0]), np.searchsorted(times, window[1], "right")
     step = max(1, math.ceil((after - first) / MAX_INSTANTS))
@@ -124,12 +125,8 @@ def movie(tree: xr.DataTree, options: Options) -> Movie:
     figure = canvas(None, (5.0, 4.2))
     grid = figure.add_gridspec(2, 2, height_ratios=[2.4, 1])
     panels = []
-    for column, (values, unit, name) in enumerate(
-        (
-            (moved, "m", "displacement"),
-            (velocity, "m/s", "velocity"),
-        )
-    ):
+    drawn = ((moved, "m", "displacement"), (velocity, "m/s", "velocity"))
+    for column, (values, unit, name) in enumerate(drawn):
         axes, scale = figure.add_subplot(grid[0, column]), scale_for(max_size(values), unit)
         values = values / scale.size
         (line,) = axes.plot(values[0], layers, ".-", color="black" if column else BLUE)
@@ -143,12 +140,7 @@ def movie(tree: xr.DataTree, options: Options) -> Movie:
     first.set_ylabel("layer, 1 at the contacts")
     below, horizontal = figure.add_subplot(grid[1, :]), time_since(window)
     near = Extent(options.extent.first, *window)
-    curves = [
-        curve(tree, "contact_force", near, color="0.7", label="contact force"),
-        curve(tree, "elastic_force", near, color=BLUE, label="mean elastic force"),
-        curve(tree, "spring_force", near, **SPRING | {"label": "force at the drive"}),
-    ]
-    draw_curves(below, curves, "spring_force", horizontal, "force")
+    _draw_forces(below, tree, near, horizontal, "0.7")
     legend_above(below)
     bar = time_bar(below)
 
@@ -167,7 +159,7 @@ VIEW = View(
     name="layers",
     kind="run",
     summary="waves in an elastic slider; movie",
-    draw=draw,
+    draw_all=draw,
     panel=draw_waves,
     options=frozenset({"realization", "start, end"}),
     movie=movie,

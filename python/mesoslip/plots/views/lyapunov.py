@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.axes import Axes
 
-from mesoslip.plots.style import BLUE, Canvas, curve_color, side_by_side, styled, titles
-from mesoslip.plots.views.base import Options, View, single_panel
+from mesoslip.plots.style import BLUE, Canvas, curve_color, side_by_side, titles
+from mesoslip.plots.views.base import Options, View
 from mesoslip.plots.views.return_map import draw_map
 from mesoslip.quantities import with_error
 
@@ -17,13 +17,12 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-def draw(tree: xr.DataTree, options: Options, figure: Canvas | None = None) -> Canvas:
+def draw(tree: xr.DataTree, options: Options, figure: Canvas | None) -> Canvas:
     """Distances of twins over time, and the return map of peaks beside them."""
-    with styled():
-        figure, (growth, peaks) = side_by_side(figure, (6.5, 3.2))
-        draw_growth(growth, tree, options)
-        draw_map(peaks, tree.to_dataset()["peak_force"].values)
-        peaks.set_title("return map of peaks", loc="left")
+    figure, (growth, peaks) = side_by_side(figure, (6.5, 3.2))
+    draw_growth(growth, tree, options)
+    draw_map(peaks, tree.to_dataset()["peak_force"].values)
+    peaks.set_title("return map of peaks", loc="left")
     return figure
 
 
@@ -53,7 +52,9 @@ def draw_growth(axes: Axes, tree: xr.DataTree, _: Options) -> None:
     titles(axes, tree)
 
 
-def draw_all(axes: Axes, trees: Sequence[xr.DataTree], labels: Sequence[str], _: Options) -> None:
+def draw_mean_growth(
+    axes: Axes, trees: Sequence[xr.DataTree], labels: Sequence[str], _: Options
+) -> None:
     """Draw the mean growth of several outputs over each other."""
     for number, (tree, label) in enumerate(zip(trees, labels, strict=True)):
         data = tree.to_dataset()
@@ -64,22 +65,11 @@ def draw_all(axes: Axes, trees: Sequence[xr.DataTree], labels: Sequence[str], _:
     axes.set_ylabel("distance, geometric mean of twins")
 
 
-def compare(
-    trees: Sequence[xr.DataTree],
-    labels: Sequence[str],
-    options: Options,
-    figure: Canvas | None = None,
-) -> Canvas:
-    """Growth in several outputs."""
-    return single_panel(lambda axes: draw_all(axes, trees, labels, options), len(trees), figure)
-
-
 VIEW = View(
     name="lyapunov",
     kind="lyapunov",
     summary="distances of twins over time, and the return map of peaks",
-    draw=draw,
+    draw_all=draw,
     panel=draw_growth,
-    compare=compare,
-    compare_panel=draw_all,
+    compare_panel=draw_mean_growth,
 )

@@ -17,10 +17,9 @@ from mesoslip.plots.style import (
     filled,
     legend_above,
     side_by_side,
-    styled,
     titles,
 )
-from mesoslip.plots.views.base import Options, View, single_panel
+from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import scale_for
 
 if TYPE_CHECKING:
@@ -35,26 +34,25 @@ EQUATIONS: dict[str, dict[str, Any]] = {
 }
 
 
-def draw(tree: xr.DataTree, options: Options, figure: Canvas | None = None) -> Canvas:
+def draw(tree: xr.DataTree, options: Options, figure: Canvas | None) -> Canvas:
     """Change of the spring force after the onset of slip, beside it with logarithmic axes."""
     solutions = _solutions([tree])
-    with styled():
-        figure, (linear, *others) = side_by_side(figure, (6.5, 3.2), 2 if solutions else 1)
-        draw_drop(linear, tree, options)
-        if not solutions:
-            return figure
-        (logarithmic,) = others
-        time = scale_for(max(one.times[-1] for one in solutions), "s")
-        force = scale_for(max(np.abs(one.drop).max() for one in solutions), "N")
-        for one in solutions:
-            color, falls = EQUATIONS[one.equation]["color"], one.drop < 0
-            times = one.times / time.size
-            logarithmic.loglog(times[falls], -one.drop[falls] / force.size, color=color)
-            asymptote = -one.asymptote[1:] / force.size
-            logarithmic.loglog(times[1:], asymptote, color=color, linestyle=":")
-        logarithmic.set_xlabel(time.label("time $t - t_c$ since the onset"))
-        logarithmic.set_ylabel(force.label(r"$-\Delta F_d$"))
-        logarithmic.set_title("dotted: short-time asymptotes", loc="left")
+    figure, (linear, *others) = side_by_side(figure, (6.5, 3.2), 2 if solutions else 1)
+    draw_drop(linear, tree, options)
+    if not solutions:
+        return figure
+    (logarithmic,) = others
+    time = scale_for(max(one.times[-1] for one in solutions), "s")
+    force = scale_for(max(np.abs(one.drop).max() for one in solutions), "N")
+    for one in solutions:
+        color, falls = EQUATIONS[one.equation]["color"], one.drop < 0
+        times = one.times / time.size
+        logarithmic.loglog(times[falls], -one.drop[falls] / force.size, color=color)
+        asymptote = -one.asymptote[1:] / force.size
+        logarithmic.loglog(times[1:], asymptote, color=color, linestyle=":")
+    logarithmic.set_xlabel(time.label("time $t - t_c$ since the onset"))
+    logarithmic.set_ylabel(force.label(r"$-\Delta F_d$"))
+    logarithmic.set_title("dotted: short-time asymptotes", loc="left")
     return figure
 
 
@@ -86,7 +84,7 @@ def draw_drops(axes: Axes, trees: Sequence[xr.DataTree], labels: Sequence[str], 
             }
         axes.plot(one.times / time.size, one.drop / force.size, **style)
         if is_sequential:
-            # The end of S46, which may be so early that its line is not visible.
+            # S46 may end so early that its line is not visible.
             end = one.times[-1] / time.size, one.drop[-1] / force.size
             axes.plot(*end, ".", color=style["color"], markersize=3)
     axes.set_xlabel(time.label("time $t - t_c$ since the onset"))
@@ -118,23 +116,12 @@ def _solutions(trees: Sequence[xr.DataTree]) -> list[_Solution]:
     return found
 
 
-def compare(
-    trees: Sequence[xr.DataTree],
-    labels: Sequence[str],
-    options: Options,
-    figure: Canvas | None = None,
-) -> Canvas:
-    """Several onsets of slip over each other."""
-    entries = len(EQUATIONS) * len(trees)
-    return single_panel(lambda axes: draw_drops(axes, trees, labels, options), entries, figure)
-
-
 VIEW = View(
     name="onset",
     kind="onset",
     summary="change of the spring force after the onset of slip",
-    draw=draw,
+    draw_all=draw,
     panel=draw_drop,
-    compare=compare,
     compare_panel=draw_drops,
+    legend_entries=len(EQUATIONS),
 )

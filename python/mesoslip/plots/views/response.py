@@ -17,8 +17,8 @@ from mesoslip.plots.forced_response import draw_forced
 from mesoslip.plots.logarithmic import logarithmic
 from mesoslip.plots.measured_response import draw_measured, draw_measured_record
 from mesoslip.plots.printing import is_narrow
-from mesoslip.plots.record import draw_record, fit_label, title_record
-from mesoslip.plots.style import RED, Canvas, canvas, styled, write_title
+from mesoslip.plots.response_record import draw_record, fit_label, title_record
+from mesoslip.plots.style import POINTS, RED, Canvas, canvas, write_title
 from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import Scale, percent, scale_for, with_error, with_unit
 
@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 
 
 def _draw_fit(axes: Axes, experiment: Experiment, record: Record, found: Fit, scale: Scale) -> None:
-    """Draw the record that a rate-and-state law gives, on the same axes."""
+    """Draw the force that a rate-and-state law predicts over the record."""
     sign = next(one.direction for one in experiment.stages if one.direction)
     drive = sign * np.interp(record.time + record.start, experiment.time, experiment.drive)
     force = (record.force - found.residual) / experiment.static_force
@@ -36,7 +36,7 @@ def _draw_fit(axes: Axes, experiment: Experiment, record: Record, found: Fit, sc
         f"$b$ = {found.law.b / experiment.static_force:.2g} $F_s$",
         f"$D_c$ = {with_unit(found.law.slip_distance, 'm', 3)}",
     ]
-    # As the table does for a law that does not describe the record.
+    # The table of the response has it too.
     misfit = found.relative_misfit(record)
     parts += [f"misfit {percent(misfit)}"] if misfit > MAX_MISFIT else []
     label = fit_label(axes, parts)
@@ -46,7 +46,7 @@ def _draw_fit(axes: Axes, experiment: Experiment, record: Record, found: Fit, sc
 
 def draw_force(axes: Axes, tree: Tree, _: Options) -> None:
     """Draw the force against the displacement of the load point, and the rate-and-state law that
-    fits better."""
+    fits best."""
     experiment = Experiment(tree)
     scale = scale_for(float(np.max(np.abs(experiment.drive))), "m")
     if experiment.is_measured:
@@ -79,9 +79,8 @@ def draw_steady(axes: Axes, data: Arrays) -> None:
     x = np.log(velocity / reference)
     for chosen, colour in ((steady, "black"), (~steady, "0.7")):
         if chosen.any():
-            axes.errorbar(
-                x[chosen], force[chosen], error[chosen], fmt="o", color=colour, markersize=3
-            )
+            style = POINTS | {"color": colour}
+            axes.errorbar(x[chosen], force[chosen], error[chosen], **style)
     found = steady_line(data)
     if found is not None:
         ends = np.array([x.min(), x.max()])
@@ -97,14 +96,8 @@ def draw_healing(axes: Axes, data: Arrays) -> None:
     """Draw the growth of the restart peak against the hold time."""
     scale = _scale(data, "healing")
     hold = data["hold_time"].values
-    axes.errorbar(
-        hold,
-        data["healing"].values * scale,
-        np.nan_to_num(data["healing_error"].values) * scale,
-        fmt="o",
-        color="black",
-        markersize=3,
-    )
+    error = np.nan_to_num(data["healing_error"].values) * scale
+    axes.errorbar(hold, data["healing"].values * scale, error, **POINTS)
     found = healing_line(data)
     logarithmic(axes, "x")
     if found is not None:
@@ -123,11 +116,10 @@ def _scale(data: Arrays, name: str) -> float:
     return float(ratio[good][0] / force[good][0]) if good.any() else 1.0
 
 
-def draw(tree: Tree, options: Options, figure: Canvas | None = None) -> Canvas:
-    """The record with the law that fits better; steady forces; healing in holds.
+def draw(tree: Tree, options: Options, figure: Canvas | None) -> Canvas:
+    """The record with the law that fits best; steady forces; healing in holds.
 
-    Of a measured trace: residuals, and a - b against velocity, instead of steady forces. Of a
-    slider under a force: displacement, velocities of creep, static friction.
+    Measured traces, and sliders under a force, have pictures of their own.
     """
     experiment = Experiment(tree)
     if experiment.is_measured:
@@ -140,20 +132,19 @@ def draw(tree: Tree, options: Options, figure: Canvas | None = None) -> Canvas:
     draws_steady = np.unique(np.abs(velocities)).size > 1
     draws_healing = bool(np.isfinite(holds["healing"].values).any())
     below = draws_steady + draws_healing
-    with styled():
-        is_stacked = is_narrow(figure) and below == 2
-        rows = 3 if is_stacked else 2 if below else 1
-        figure = canvas(figure, (3.4 if is_stacked else 6.5, 2.5 * rows if below else 3.0))
-        columns = 1 if is_stacked else max(below, 1)
-        panels = figure.add_gridspec(rows, columns)
-        record = figure.add_subplot(panels[0, :])
-        draw_force(record, tree, options)
-        has_holds = any(stage.is_hold for stage in experiment.stages)
-        title_record(record, tree, "blue: holds and their durations" if has_holds else "")
-        if draws_steady:
-            draw_steady(figure.add_subplot(panels[1, 0]), steady)
-        if draws_healing:
-            draw_healing(figure.add_subplot(panels[rows - 1, columns - 1]), holds)
+    is_stacked = is_narrow(figure) and below == 2
+    rows = 3 if is_stacked else 2 if below else 1
+    figure = canvas(figure, (3.4 if is_stacked else 6.5, 2.5 * rows if below else 3.0))
+    columns = 1 if is_stacked else max(below, 1)
+    panels = figure.add_gridspec(rows, columns)
+    record = figure.add_subplot(panels[0, :])
+    draw_force(record, tree, options)
+    has_holds = any(stage.is_hold for stage in experiment.stages)
+    title_record(record, tree, "blue: holds and their durations" if has_holds else "")
+    if draws_steady:
+        draw_steady(figure.add_subplot(panels[1, 0]), steady)
+    if draws_healing:
+        draw_healing(figure.add_subplot(panels[rows - 1, columns - 1]), holds)
     return figure
 
 
@@ -161,7 +152,7 @@ VIEW = View(
     name="response",
     kind="run",
     summary="steady forces, velocity steps and holds",
-    draw=draw,
+    draw_all=draw,
     panel=draw_force,
     takes_arrays=True,
 )

@@ -9,17 +9,12 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from mesoslip.analysis.return_map import settled_peaks
-from mesoslip.plots.style import BLUE, Canvas, titles
-from mesoslip.plots.views.base import Options, View, single_panel
+from mesoslip.plots.style import BLUE, titles
+from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import scale_for
 
 if TYPE_CHECKING:
     import xarray as xr
-
-
-def draw(tree: xr.DataTree, options: Options, figure: Canvas | None = None) -> Canvas:
-    """Each peak of the second half of a run over the peak before it."""
-    return single_panel(lambda axes: draw_panel(axes, tree, options), 0, figure)
 
 
 def draw_panel(axes: Axes, tree: xr.DataTree, options: Options) -> None:
@@ -29,7 +24,7 @@ def draw_panel(axes: Axes, tree: xr.DataTree, options: Options) -> None:
 
 
 def draw_map(axes: Axes, peaks: NDArray[np.float64]) -> None:
-    """Draw each of some peaks [N] over the one before."""
+    """Draw peaks [N] over the ones before them."""
     scale = scale_for(float(np.max(np.abs(peaks), initial=0.0)) or 1.0, "N")
     shown = peaks / scale.size
     axes.plot(shown[:-1], shown[1:], ".", color=BLUE, markersize=3)
@@ -44,7 +39,6 @@ VIEW = View(
     name="return-map",
     kind="run",
     summary="each peak of the force over the one before",
-    draw=draw,
     panel=draw_panel,
     options=frozenset({"realization"}),
 )

@@ -25,40 +25,38 @@ from mesoslip.plots.style import (
     curve_style,
     legend_above,
     shared_legend,
-    styled,
     titles,
 )
-from mesoslip.plots.trace import NAMES, force_of, is_known
+from mesoslip.plots.trace_variables import NAMES, force_of, is_known
 from mesoslip.plots.views.base import EXTENT, Options, View
 
 BELOW = ("velocity", "detached_contacts")
 
 
-def draw(tree: Tree, options: Options, figure: Canvas | None = None) -> Canvas:
+def draw(tree: Tree, options: Options, figure: Canvas | None) -> Canvas:
     """Force, velocity and detached contacts; beside them the same during the largest slip."""
     extent = options.extent
     slip, horizontal = largest_slip(tree, extent), horizontal_axis([tree], extent)
     below = _known_below([tree])
     is_stacked = slip is not None and is_narrow(figure)
-    with styled():
-        size = (6.5 if slip is None else 8.0, _height(below))
-        figure = canvas(figure, (3.4, 2.6 + 2.1 * len(below)) if is_stacked else size)
-        panels = _panels(figure, 1 + len(below), slip is not None, is_stacked)
-        _draw_force(panels[0, 0], tree, extent, horizontal)
-        for axes, name in zip(panels[1:, 0], below, strict=True):
-            _draw_variable(axes, tree, name, extent, horizontal)
-        if slip is not None:
-            is_shaded = extent.horizontal[0] == "time"
-            place = "above" if is_stacked else "at left"
-            title = f"largest slip (shaded {place})" if is_shaded else "largest slip"
-            draw_slip(list(panels[:, 1]), tree, slip, below, extent, title)
-            if is_shaded:
-                edges = [slip[name] / horizontal.scale.size for name in ("start_time", "end_time")]
-                for axes in panels[:, 0]:
-                    axes.axvspan(*edges, color=YELLOW, alpha=0.4, linewidth=0.8, zorder=0)
-        for axes in panels[:-1].flat:
-            axes.set_xlabel("")
-        figure.align_ylabels(panels)
+    size = (6.5 if slip is None else 8.0, _height(below))
+    figure = canvas(figure, (3.4, 2.6 + 2.1 * len(below)) if is_stacked else size)
+    panels = _panels(figure, 1 + len(below), slip is not None, is_stacked)
+    _draw_force(panels[0, 0], tree, extent, horizontal)
+    for axes, name in zip(panels[1:, 0], below, strict=True):
+        _draw_variable(axes, tree, name, extent, horizontal)
+    if slip is not None:
+        is_shaded = extent.horizontal[0] == "time"
+        place = "above" if is_stacked else "at left"
+        title = f"largest slip (shaded {place})" if is_shaded else "largest slip"
+        draw_slip(list(panels[:, 1]), tree, slip, below, extent, title)
+        if is_shaded:
+            edges = [slip[name] / horizontal.scale.size for name in ("start_time", "end_time")]
+            for axes in panels[:, 0]:
+                axes.axvspan(*edges, color=YELLOW, alpha=0.4, linewidth=0.8, zorder=0)
+    for axes in panels[:-1].flat:
+        axes.set_xlabel("")
+    figure.align_ylabels(panels)
     return figure
 
 
@@ -67,13 +65,9 @@ def _panels(figure: Canvas, rows: int, has_slip: bool, is_stacked: bool) -> NDAr
     ratios = [1.7, *(1 for _ in range(rows - 1))]
     if not is_stacked:
         columns = 2 if has_slip else 1
+        widths = [2.1, 1][:columns]
         panels: NDArray[Any] = figure.subplots(
-            rows,
-            columns,
-            sharex="col",
-            squeeze=False,
-            height_ratios=ratios,
-            width_ratios=[2.1, 1][:columns],
+            rows, columns, sharex="col", squeeze=False, height_ratios=ratios, width_ratios=widths
         )
         return panels
     stacked = figure.subplots(2 * rows, 1, height_ratios=2 * ratios)
@@ -86,7 +80,7 @@ def _panels(figure: Canvas, rows: int, has_slip: bool, is_stacked: bool) -> NDAr
 
 
 def draw_force(axes: Axes, tree: Tree, options: Options) -> None:
-    """Draw the spring force; for an elastic slider the mean force in it, and that at the drive."""
+    """Draw the spring force; of an elastic slider its mean force, and the force at the drive."""
     _draw_force(axes, tree, options.extent, horizontal_axis([tree], options.extent))
 
 
@@ -120,12 +114,12 @@ def _draw_variable(
 
 
 def _known_below(trees: Sequence[Tree]) -> list[str]:
-    """Variables below the force, those that some output has."""
+    """The variables below the force that an output has."""
     return [name for name in BELOW if any(is_known(tree, name) for tree in trees)]
 
 
 def _height(below: Sequence[str]) -> float:
-    """Height of a figure [inch] of the force, with panels below it."""
+    """Height of a figure with panels below the force [inch]."""
     return 2.8 + 1.2 * len(below)
 
 
@@ -133,20 +127,19 @@ def compare(
     trees: Sequence[Tree],
     labels: Sequence[str],
     options: Options,
-    figure: Canvas | None = None,
+    figure: Canvas | None,
 ) -> Canvas:
     """Force, velocity and detached contacts of several runs over each other."""
     horizontal = horizontal_axis(trees, options.extent)
     below = _known_below(trees)
-    with styled():
-        figure = canvas(figure, (6.5, _height(below) + 0.16 * len(trees)))
-        ratios = [1.7, *(1 for _ in below)]
-        panels = figure.subplots(len(ratios), 1, sharex=True, squeeze=False, height_ratios=ratios)
-        for axes, name in zip(panels[:, 0], (None, *below), strict=True):
-            _compare(axes, trees, labels, name, options.extent, horizontal)
-        for axes in panels[:-1, 0]:
-            axes.set_xlabel("")
-        shared_legend(figure, panels[0, 0])
+    figure = canvas(figure, (6.5, _height(below) + 0.16 * len(trees)))
+    ratios = [1.7, *(1 for _ in below)]
+    panels = figure.subplots(len(ratios), 1, sharex=True, squeeze=False, height_ratios=ratios)
+    for axes, name in zip(panels[:, 0], (None, *below), strict=True):
+        _compare(axes, trees, labels, name, options.extent, horizontal)
+    for axes in panels[:-1, 0]:
+        axes.set_xlabel("")
+    shared_legend(figure, panels[0, 0])
     return figure
 
 
@@ -166,9 +159,9 @@ def _compare(
     extent: Extent,
     horizontal: HorizontalAxis,
 ) -> None:
-    """Draw a variable of several runs over each other; the force of each (`force_of`) if None."""
+    """Draw a variable of several runs, or the force of each (`force_of`), over each other."""
     names = [name or force_of(tree) for tree in trees]
-    # The noise of measured traces must not hide computed ones.
+    # The noise of measured traces must not hide computed traces.
     curves = [
         curve(
             tree,
@@ -194,10 +187,10 @@ VIEW = View(
     name="run",
     kind="run",
     summary="force, velocity and detached contacts, with the largest slip beside them",
-    draw=draw,
+    draw_all=draw,
     panel=draw_force,
     options=EXTENT,
-    compare=compare,
+    compare_all=compare,
     compare_panel=compare_forces,
     takes_arrays=True,
     applies=_has_velocity,

@@ -15,7 +15,7 @@ from mesoslip.output.samples import times_of
 from mesoslip.plots.axis import HorizontalAxis, horizontal_axis
 from mesoslip.plots.curves import about_realizations, curve, draw_curves
 from mesoslip.plots.extent import Extent
-from mesoslip.plots.style import RED, Canvas, canvas, styled, titles
+from mesoslip.plots.style import RED, Canvas, canvas, titles
 from mesoslip.plots.views import run
 from mesoslip.plots.views.base import EXTENT, Options, View
 
@@ -24,35 +24,34 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-# Avalanches with a vector mark each; more of them become an image.
+# Maximum number of avalanches with a vector mark each; more of them become an image.
 MAX_MARKS = 3000
 
 
-def draw(tree: Tree, options: Options, figure: Canvas | None = None) -> Canvas:
+def draw(tree: Tree, options: Options, figure: Canvas | None) -> Canvas:
     """Contact force and sizes of avalanches against the displacement of the slider."""
     extent = _against_displacement(options.extent)
     horizontal, data = horizontal_axis([tree], extent), _catalogue(tree, extent)
     count = config_of(tree).contacts.count
-    with styled():
-        figure = canvas(figure, (6.5, 5))
-        force, sizes = figure.subplots(2, 1, sharex=True)
-        _draw_force(force, tree, extent, horizontal)
-        force.set_xlabel("")
-        x = _positions(tree, data, extent)
-        sizes.semilogy(
-            x / horizontal.scale.size,
-            data["size"].values,
-            ".",
-            color="black",
-            markersize=2,
-            rasterized=x.size > MAX_MARKS,
-        )
-        sizes.set_ylabel("avalanche size")
-        sizes.set_ylim(0.8, 1.25 * max(count, data["size"].values.max(initial=1)))
-        sizes.axhline(count, color=RED, linewidth=0.6)
-        title = f"red: number of contacts, {count}"
-        sizes.set_title(title if x.size else f"no avalanche; {title}", loc="left")
-        horizontal.prepare(sizes)
+    figure = canvas(figure, (6.5, 5))
+    force, sizes = figure.subplots(2, 1, sharex=True)
+    _draw_force(force, tree, extent, horizontal)
+    force.set_xlabel("")
+    x = _positions(tree, data, extent)
+    sizes.semilogy(
+        x / horizontal.scale.size,
+        data["size"].values,
+        ".",
+        color="black",
+        markersize=2,
+        rasterized=x.size > MAX_MARKS,
+    )
+    sizes.set_ylabel("avalanche size")
+    sizes.set_ylim(0.8, 1.25 * max(count, data["size"].values.max(initial=1)))
+    sizes.axhline(count, color=RED, linewidth=0.6)
+    title = f"red: number of contacts, {count}"
+    sizes.set_title(title if x.size else f"no avalanche; {title}", loc="left")
+    horizontal.prepare(sizes)
     return figure
 
 
@@ -70,7 +69,7 @@ def _draw_force(axes: Axes, tree: Tree, extent: Extent, horizontal: HorizontalAx
 
 
 def _against_displacement(extent: Extent) -> Extent:
-    """The extent, against the displacement unless another axis was asked for."""
+    """The extent, against the displacement by default."""
     return replace(extent, against=extent.against or "displacement")
 
 
@@ -105,10 +104,10 @@ VIEW = View(
     name="run",
     kind="run",
     summary="contact force and avalanches of a slider without inertia",
-    draw=draw,
+    draw_all=draw,
     panel=draw_force,
     options=EXTENT,
-    compare=run.compare,
+    compare_all=run.compare,
     compare_panel=run.compare_forces,
     takes_arrays=True,
     applies=_jumps,

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from mesoslip.output.access import config_of
-from mesoslip.plots.style import BLUE, RED, Canvas, canvas, legend_above, styled, titles
+from mesoslip.plots.style import BLUE, RED, Canvas, canvas, legend_above, titles
 from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import Scale, scale_for, with_unit
 
@@ -16,33 +16,32 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-def draw(tree: xr.DataTree, options: Options, figure: Canvas | None = None) -> Canvas:
+def draw(tree: xr.DataTree, options: Options, figure: Canvas | None) -> Canvas:
     """Force and critical stiffness over velocity, with the configured spring."""
     data = tree.to_dataset()
     critical = data["critical_stiffness"].values
-    with styled():
-        figure = canvas(figure, (6.5, 4.8))
-        force, stiffness = figure.subplots(2, 1, sharex=True, height_ratios=[1.3, 1])
-        draw_force(force, tree, options)
-        force.set_xlabel("")
-        spring = config_of(tree).spring_stiffness
-        has_spring = 0 < spring < np.inf
-        scale = scale_for(float(np.nanmax([*critical, spring if has_spring else 1.0])), "N/m")
-        speed = _speed(tree)
-        # Where sliding is stable with any spring there is no point on a logarithmic axis.
-        shown = np.where(critical > 0, critical / scale.size, np.nan)
-        at = data["velocity"].values / speed.size
-        stiffness.plot(at, shown, color="black", marker="o", markersize=3, label="$K_c$")
-        if has_spring:
-            label = f"spring, {with_unit(spring, 'N/m')}: unstable where $K_c$ is above it"
-            stiffness.axhline(spring / scale.size, color=RED, linestyle="--", label=label)
-        if np.any(np.isfinite(shown)):
-            stiffness.set_yscale("log")
-        stiffness.set_ylabel(scale.label("stiffness"))
-        stiffness.set_xlabel(speed.label("velocity $v$"))
-        for one in np.atleast_1d(tree.attrs.get("boundaries", [])):
-            stiffness.axvline(one / speed.size, color=RED, linewidth=0.7, alpha=0.6, zorder=0)
-        legend_above(stiffness)
+    figure = canvas(figure, (6.5, 4.8))
+    force, stiffness = figure.subplots(2, 1, sharex=True, height_ratios=[1.3, 1])
+    draw_force(force, tree, options)
+    force.set_xlabel("")
+    spring = config_of(tree).spring_stiffness
+    has_spring = 0 < spring < np.inf
+    scale = scale_for(float(np.nanmax([*critical, spring if has_spring else 1.0])), "N/m")
+    speed = _speed(tree)
+    # Where sliding is stable with any spring there is no point on the logarithmic axis.
+    shown = np.where(critical > 0, critical / scale.size, np.nan)
+    at = data["velocity"].values / speed.size
+    stiffness.plot(at, shown, color="black", marker="o", markersize=3, label="$K_c$")
+    if has_spring:
+        label = f"spring, {with_unit(spring, 'N/m')}: unstable where $K_c$ is above it"
+        stiffness.axhline(spring / scale.size, color=RED, linestyle="--", label=label)
+    if np.any(np.isfinite(shown)):
+        stiffness.set_yscale("log")
+    stiffness.set_ylabel(scale.label("stiffness"))
+    stiffness.set_xlabel(speed.label("velocity $v$"))
+    for one in np.atleast_1d(tree.attrs.get("boundaries", [])):
+        stiffness.axvline(one / speed.size, color=RED, linewidth=0.7, alpha=0.6, zorder=0)
+    legend_above(stiffness)
     return figure
 
 
@@ -79,6 +78,6 @@ VIEW = View(
     name="steady",
     kind="steady",
     summary="force of steady sliding and critical stiffness over velocity",
-    draw=draw,
+    draw_all=draw,
     panel=draw_force,
 )

@@ -14,12 +14,17 @@ from numpy.typing import NDArray
 
 from mesoslip.errors import FileError
 from mesoslip.plots.boundaries import BOUNDARIES, REGIME, add_legend, draw_contours, draw_crossings
-from mesoslip.plots.directions import DIRECTION, STYLES
+from mesoslip.plots.key_names import name_of, symbol_or_name
 from mesoslip.plots.logarithmic import logarithmic
-from mesoslip.plots.names import name_of, symbol_or_name
 from mesoslip.plots.printing import is_narrow
-from mesoslip.plots.style import BLUE, Canvas, axes_width, canvas, plain, styled, wrapped
-from mesoslip.plots.sweep_axis import SweptKey, scale_of, spans_decades
+from mesoslip.plots.style import BLUE, Canvas, axes_width, canvas, plain, wrapped
+from mesoslip.plots.sweep_axis import (
+    DIRECTION,
+    DIRECTION_STYLES,
+    SweptKey,
+    scale_of,
+    spans_decades,
+)
 from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import number
 
@@ -37,15 +42,9 @@ MAP_COLUMNS = 3
 CHOICE_COLORS = ("#a3cbe5", "#cc6677", "#f5e9b0", "#a5a5a5", "#5aa382", "#84669e")
 
 
-def draw(tree: xr.DataTree, options: Options, figure: Canvas | None = None) -> Canvas:
+def draw(tree: xr.DataTree, options: Options, figure: Canvas | None) -> Canvas:
     """A panel for each of the first measures of a sweep; or one measure, with a panel for each
-    value of the first of three dimensions.
-
-    Raises
-    ------
-    FileError
-        If the sweep has no such measure.
-    """
+    value of the first of three dimensions."""
     data = tree.to_dataset()
     if options.measure is None:
         panels = [(data, one) for one in measures(data)[:MAX_PANELS]]
@@ -55,7 +54,7 @@ def draw(tree: xr.DataTree, options: Options, figure: Canvas | None = None) -> C
     columns = min(len(panels), COLUMNS if options.measure is None else MAP_COLUMNS)
     columns = 1 if is_narrow(figure) else columns
     rows = -(-len(panels) // columns)
-    with styled(), mpl.rc_context({"axes.spines.top": True, "axes.spines.right": True}):
+    with mpl.rc_context({"axes.spines.top": True, "axes.spines.right": True}):
         figure = canvas(figure, (max(4.4, 3.4 * columns), 2.5 * rows + 0.4))
         all_axes = figure.subplots(rows, columns, squeeze=False).ravel()
         lines: dict[str, Line2D] = {}
@@ -71,13 +70,8 @@ def draw(tree: xr.DataTree, options: Options, figure: Canvas | None = None) -> C
 def draw_panel(axes: Axes, tree: xr.DataTree, options: Options) -> None:
     """Draw a measure of a sweep, the first one by default.
 
-    Over one key: realizations as dots, and their mean; over two: a map of the mean. Of a choice
-    such as the regime: the most frequent one.
-
-    Raises
-    ------
-    FileError
-        If the sweep has no such measure.
+    Over one key it is dots for realizations and a line for their mean; over two a map of the mean,
+    or of the most frequent one of a choice such as the regime.
     """
     data = tree.to_dataset()
     name = measures(data)[0] if options.measure is None else _known(data, options.measure)
@@ -85,7 +79,7 @@ def draw_panel(axes: Axes, tree: xr.DataTree, options: Options) -> None:
 
 
 def measures(data: xr.Dataset) -> list[str]:
-    """Measures of a sweep that have a picture; those of boundaries in that of the regime do not."""
+    """Measures of a sweep that have a picture: with the regime, not those of its boundaries."""
     names = [str(name) for name in data.data_vars if name != "status"]
     lines = {one.measure for one in BOUNDARIES}
     return [name for name in names if REGIME not in names or name not in lines]
@@ -99,7 +93,7 @@ def _known(data: xr.Dataset, name: str) -> str:
 
 
 def _draw_measure(axes: Axes, data: xr.Dataset, name: str) -> list[Line2D]:
-    """Draw a measure; lines of boundaries for a legend."""
+    """Draw a measure; returns lines for a legend, of boundaries or directions."""
     lines: list[Line2D] = []
     data, names, fixed = _shown_keys(data)
     keys = [SweptKey.of(data[one]) for one in names]
@@ -121,8 +115,7 @@ def _draw_measure(axes: Axes, data: xr.Dataset, name: str) -> list[Line2D]:
             lines = draw_contours(axes, data, keys)
     for key, which in zip(keys, "xy", strict=False):
         key.apply(axes, which)
-    if len(keys) == 2:
-        for key, which in zip(keys, "xy", strict=True):
+        if len(keys) == 2:
             key.label_values(axes, which)
     title = "; ".join([scale.label(name_of(name)), *fixed])
     axes.set_title(wrapped(title, axes_width(axes)), loc="left")
@@ -131,8 +124,7 @@ def _draw_measure(axes: Axes, data: xr.Dataset, name: str) -> list[Line2D]:
 
 def _shown_keys(data: xr.Dataset) -> tuple[xr.Dataset, list[str], list[str]]:
     """A sweep at the first values of its third and further dimensions, the keys along the first
-    two, and the values of the others in words. Of one that goes up and down: only the key along
-    which it does."""
+    two, and the values of the others in words. If it goes up and down a key, only that is shown."""
     dimensions = _dimensions(data)
     if DIRECTION in data.dims:
         dimensions.sort(key=lambda name: name != data.attrs["continued_key"])
@@ -163,9 +155,10 @@ def _dimensions(data: xr.Dataset) -> list[str]:
 
 
 def _draw_directions(axes: Axes, measure: xr.DataArray, key: SweptKey) -> list[Line2D]:
-    """Draw a measure up and down one key: dots, and a line through the means; the lines."""
+    """Draw a measure up and down one key, as dots, and as lines through the means, which it
+    returns."""
     lines = []
-    for direction, style in STYLES.items():
+    for direction, style in DIRECTION_STYLES.items():
         branch = measure.sel({DIRECTION: direction}).transpose(..., "realization")
         axes.plot(key.values, branch.values, linestyle="", **style)
         mean = branch.mean("realization").values[key.order]
@@ -174,7 +167,7 @@ def _draw_directions(axes: Axes, measure: xr.DataArray, key: SweptKey) -> list[L
 
 
 def _scale_values(axes: Axes, measure: xr.DataArray, choices: tuple[str, ...]) -> None:
-    """Label the choices, or choose the scale, of the axis of a measure."""
+    """Label the choices of a measure on its axis, or choose its scale."""
     if choices:
         axes.set_yticks(range(len(choices)), choices)
         axes.set_ylim(-0.5, len(choices) - 0.5)
@@ -226,8 +219,8 @@ def _most_frequent(values: Array, count: int) -> Array:
 
 
 def _parts(data: xr.Dataset) -> Iterator[xr.Dataset]:
-    """The sweep at each value of its first dimension, if it has three; if it goes up and down one,
-    at each value of the other."""
+    """The sweep at each value of its first dimension, if it has three; or of the other dimension,
+    if it has two and goes up and down one."""
     dimensions = _dimensions(data)
     if len(dimensions) != (2 if DIRECTION in data.dims else 3):
         yield data
@@ -243,7 +236,7 @@ VIEW = View(
     name="sweep",
     kind="sweep",
     summary="measures over the swept keys",
-    draw=draw,
+    draw_all=draw,
     panel=draw_panel,
     options=frozenset({"measure"}),
 )

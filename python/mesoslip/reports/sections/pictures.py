@@ -8,7 +8,7 @@ from mesoslip.output.access import group_of
 from mesoslip.output.kinds import kind_of
 from mesoslip.plots import draw
 from mesoslip.plots.extent import Extent
-from mesoslip.plots.lattice import is_on_lattice
+from mesoslip.plots.snapshots import is_on_lattice
 from mesoslip.plots.views import view_of
 from mesoslip.plots.views.base import Options
 from mesoslip.reports.content import PARTS, Block, Section, Subject, drawn

@@ -17,13 +17,13 @@ NAMES = {
     "velocity": "velocity",
     "detached_contacts": "detached contacts",
 }
-# Units of the trace as a configuration writes them.
+# Units of the trace as configurations write them.
 UNITS = {name: from_cf_units(one.units) for name, one in TRACE.items()}
 UNITS |= {"time": "s", "friction_coefficient": "1"}
 
 
 def is_known(tree: Tree, name: str) -> bool:
-    """Whether an output has values of a variable of the trace: a measured one may not."""
+    """Whether an output has values of a variable of the trace; a measured trace may lack some."""
     if not is_measured(tree):
         return True
     # Files of earlier versions have variables without values.
@@ -31,7 +31,7 @@ def is_known(tree: Tree, name: str) -> bool:
 
 
 def force_of(tree: Tree) -> str:
-    """The force that shows the motion: for an elastic slider the mean one in it."""
+    """The force that shows the motion: for an elastic slider the mean elastic force."""
     return "elastic_force" if "elastic_force" in tree.data_vars else driving_force_of(tree)
 
 

@@ -19,21 +19,21 @@ from mesoslip.quantities import Scale, scale_for, with_unit
 
 Array = NDArray[np.float64]
 
-# Samples of the record at equal intervals of time, and as many at equal distances.
+# Samples of the record at equal intervals of time, and at equal intervals of displacement.
 MAX_DOTS = 20_000
-# Stages whose starts are marked, and stages with a label.
+# Maximum numbers of stages whose starts are marked, and of stages with labels.
 MAX_MARKS = 200
 MAX_LABELS = 12
 # Distance of the title from the record, with the labels of stages between them [pt].
 LABEL_ROOM = 22
 # Distance of the lines of a legend, over the size of its font.
 LINE_SPACING = 1.5
-# Minimum distance of two labels, as a part of the width.
+# Minimum distance of two labels, as a fraction of the width.
 LABEL_WIDTH = 0.03
 
 
 def force_unit(experiment: Experiment) -> Scale:
-    """The unit of forces in pictures, with the label of their axis."""
+    """The unit of forces in pictures, whose name is the label of their axis."""
     if experiment.config is not None:
         return Scale("force over $F_s$", experiment.static_force)
     if experiment.apparatus.force_unit == "1":
@@ -43,17 +43,7 @@ def force_unit(experiment: Experiment) -> Scale:
 
 
 def draw_record(axes: Axes, experiment: Experiment, scale: Scale) -> None:
-    """Draw the force against the displacement of the load point.
-
-    Parameters
-    ----------
-    axes
-        Where.
-    experiment
-        The output.
-    scale
-        Unit of the displacement.
-    """
+    """Draw the force against the displacement of the load point in a unit."""
     shown = _dots(experiment)
     sign = next((one.direction for one in experiment.stages if one.direction), 1.0)
     unit = force_unit(experiment)
@@ -62,7 +52,7 @@ def draw_record(axes: Axes, experiment: Experiment, scale: Scale) -> None:
     axes.plot(x[shown] / scale.size, force[shown], color="black", linewidth=0.6)
     steady = next((one for one in experiment.stages if experiment.mean_of(one) is not None), None)
     if steady is not None and len(experiment.stages) > 1:
-        # The range after steady sliding is reached: what comes before may be far larger.
+        # The range of forces after steady sliding is reached: before, it may be far larger.
         mean = experiment.mean_of(steady)
         assert mean is not None
         later = force[experiment.samples(steady).start + mean.start :]
@@ -77,22 +67,16 @@ def draw_record(axes: Axes, experiment: Experiment, scale: Scale) -> None:
 
 
 def fit_label(axes: Axes, parts: Sequence[str]) -> str:
-    """Label of a law that is fitted to the record, in lines that fit into axes.
-
-    Parameters
-    ----------
-    axes
-        Where.
-    parts
-        The law, and its parameters, none of which breaks into two lines.
-    """
+    """A law and its parameters as a label in lines that fit into axes, each part on one line."""
     text = ", ".join(one.replace(" ", "\N{NO-BREAK SPACE}") for one in parts)
     return wrapped(text, axes_width(axes))
 
 
 def title_record(axes: Axes, tree: Tree, about: str = "") -> None:
-    """Write the title of an output above the labels of its stages, and a line about them; between
-    title and labels the legend, where it hides no data."""
+    """Write the title of an output, and a line about its stages, above the labels of the stages.
+
+    The legend goes between title and labels, where it hides no data.
+    """
     titles(axes, tree, about)
     labels = axes.get_legend_handles_labels()[1]
     lines = sum(label.count("\n") + 1 for label in labels)
@@ -114,7 +98,7 @@ def title_record(axes: Axes, tree: Tree, about: str = "") -> None:
 
 
 def _dots(experiment: Experiment) -> NDArray[np.int64]:
-    """Samples of a line: equidistant ones in time, and as many along the drive."""
+    """Indices of samples of a line: equidistant in time, and equidistant along the drive."""
     count = experiment.time.size
     if count <= 2 * MAX_DOTS:
         return np.arange(count)
@@ -133,24 +117,25 @@ def _label_stages(axes: Axes, experiment: Experiment, x: Array, scale: Scale) ->
     for stage in experiment.stages:
         if not (stage.is_hold or stage.is_steady):
             continue
-        inside = experiment.samples(stage)
-        index = (
-            experiment.start_sample(stage) if stage.is_hold else (inside.start + inside.stop) // 2
-        )
+        if stage.is_hold:
+            index, color = experiment.start_sample(stage), BLUE
+            label = with_unit(stage.duration, "s")
+        else:
+            inside = experiment.samples(stage)
+            index, color = (inside.start + inside.stop) // 2, "0.4"
+            label = with_unit(abs(stage.velocity), "m/s", 3)
         position = x[min(index, x.size - 1)]
         # Labels of short stages would lie over each other.
         if abs(position - last) < min_distance:
             continue
         last = position
         axes.annotate(
-            with_unit(stage.duration, "s")
-            if stage.is_hold
-            else with_unit(abs(stage.velocity), "m/s", 3),
+            label,
             (position / scale.size, 1.0),
             xycoords=("data", "axes fraction"),
             fontsize="x-small",
             ha="center",
             va="bottom",
-            color=BLUE if stage.is_hold else "0.4",
+            color=color,
             rotation=40 if len(experiment.stages) > 4 else 0,
         )

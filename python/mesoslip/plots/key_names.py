@@ -22,7 +22,7 @@ SYMBOLS = {
     "slider.stiffness": "$K$",
     "fit.wander": "wander",
 }
-# Names for keys whose last part is ambiguous.
+# Names of keys whose last part is ambiguous, and of a measure.
 NAMES = {
     "contacts.stiffness": "stiffness of the contacts",
     "contacts.count": "number of contacts",

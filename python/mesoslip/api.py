@@ -1,4 +1,4 @@
-"""`run`: simulate a configuration, from whatever names it to its results."""
+"""`run`: simulate a configuration."""
 
 from __future__ import annotations
 
@@ -29,16 +29,18 @@ def run(
     config
         A TOML file, an output to run again, nested tables, or a `Config`.
     executor
-        Where realizations are computed: `Threads`, `Processes` or `Dask`, or a number of threads,
-        by default the number of processors. The result does not depend on it.
+        Computes the realizations: `Threads`, `Processes` or `Dask`, or a number of threads, by
+        default the number of processors. The result does not depend on it.
     progress
-        Called repeatedly with the fraction of the work that is done, 0 to 1.
+        Called repeatedly with the completed fraction of the work, 0 to 1.
 
     Returns
     -------
     xarray.DataTree
-        The same as in an output file. After Ctrl-C its attribute ``complete`` is "false", and
-        samples that were not computed are NaN.
+        Equal to an output file. The root has the trace, with dimensions (realization, time), and
+        numbers for each realization; groups are ``slips``, ``stages``, ``energy``, and where there
+        are any ``slip_traces``, ``avalanches`` and ``snapshots``. After Ctrl-C the attribute
+        ``complete`` is "false", and samples that were not computed are NaN.
 
     Raises
     ------

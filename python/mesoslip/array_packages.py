@@ -1,4 +1,4 @@
-"""xarray without the packages of other arrays than NumPy's, which take longer to import than it."""
+"""Import of xarray without packages of other arrays than NumPy's, which are slower to import."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-# Packages that xarray imports, where they are installed, to compare the types of their arrays with
-# those of its data, and to find the locks that a scheduler needs. Outputs have NumPy's arrays.
+# Packages that xarray imports, where they are installed, to recognize their arrays and to find the
+# locks of a scheduler. Outputs have NumPy's arrays.
 ARRAY_PACKAGES = ("dask", "pint", "cupy", "sparse")
 
 
 @contextmanager
 def hidden() -> Iterator[None]:
-    """While the context lasts, those that are not yet imported seem not to be installed."""
+    """Hide the packages that are not imported yet, as if they were not installed."""
     absent = [name for name in ARRAY_PACKAGES if name not in sys.modules]
     # None there makes an import fail.
     sys.modules.update(dict.fromkeys(absent))  # type: ignore[arg-type]
@@ -25,10 +25,10 @@ def hidden() -> Iterator[None]:
 
 
 def import_xarray() -> None:
-    """Import xarray with all of them hidden while it looks for them, unless it is imported.
+    """Import xarray, and hide the packages while it looks for them.
 
-    It looks once in a process, at its first index and its first data to load. Others can import the
-    packages afterwards.
+    It does so once in a process, at its first index and the first data that it loads. Afterwards
+    the packages can be imported as usual.
     """
     if "xarray" in sys.modules:
         return

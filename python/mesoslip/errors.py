@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-# Maximum number of characters of a value in a message.
+# Maximum number of characters of a value in messages.
 MAX_SHOWN = 100
 
 
@@ -19,10 +19,8 @@ class MesoslipError(Exception):
 
 
 def printable(text: str) -> str:
-    """A text that is safe on a terminal: control characters are escaped.
-
-    So are undecodable bytes of file names, and characters that change the direction of writing.
-    """
+    """A text that is safe on a terminal: control characters, undecodable bytes of file names, and
+    characters that change the direction of writing are escaped."""
     return "".join(
         one if one.isprintable() else one.encode("unicode_escape").decode() for one in text
     )
@@ -48,7 +46,7 @@ def shown(value: object) -> str:
     """A value as a message shows it, shortened if it is long."""
     try:
         text = repr(value)
-    # Python does not write integers of thousands of digits, nor tables nested without end.
+    # Python refuses integers of thousands of digits and tables nested without end.
     except (ValueError, RecursionError):
         return f"a {type(value).__name__} that is too long to show"
     return text if len(text) <= MAX_SHOWN else f"{text[: MAX_SHOWN - 10]} ... {text[-5:]}"

@@ -19,7 +19,7 @@ def _folder() -> Path:
 
 
 def examples() -> dict[str, str]:
-    """Titles of the examples by name; without a title the first line of the comment."""
+    """Titles of the examples by name; the first line of the file if it has no title."""
     found = {}
     folder = _folder()
     for path in sorted(folder.rglob(f"*{ENDING}")):
@@ -31,7 +31,7 @@ def examples() -> dict[str, str]:
 
 
 def example(name: str, file: PathLike | None = None) -> list[Path]:
-    """Write an example configuration, and beside it the files that it is based on.
+    """Write an example configuration, and the files that it needs.
 
     Parameters
     ----------
@@ -43,8 +43,8 @@ def example(name: str, file: PathLike | None = None) -> list[Path]:
     Returns
     -------
     list of pathlib.Path
-        The files that were written. Files that it is based on, and the data of a measurement, are
-        not written over.
+        The files that were written: the example, and in its folder the files that it is based on
+        and the data of a measurement, unless they exist.
 
     Raises
     ------
@@ -70,7 +70,7 @@ def example(name: str, file: PathLike | None = None) -> list[Path]:
         tables = tomllib.loads(text)
         base = tables.get("base")
         if base is not None:
-            # The base is written beside it, wherever it is installed.
+            # The base is written to the same folder.
             text = text.replace(f'"{base}"', f'"{Path(base).name}"', 1)
         _write_new(target, text.encode())
         written.append(target)
@@ -88,16 +88,10 @@ def example(name: str, file: PathLike | None = None) -> list[Path]:
 
 
 def _write_new(path: Path, contents: bytes) -> None:
-    """Write a file that does not exist.
-
-    Raises
-    ------
-    FileError
-        If it cannot be written.
-    """
+    """Write a new file."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        # Never over a file of somebody, not even one that has come meanwhile.
+        # Mode x: a file of that name may have been made in the meantime.
         with path.open("xb") as stream:
             stream.write(contents)
     except (OSError, ValueError) as error:

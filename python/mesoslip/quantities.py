@@ -1,4 +1,4 @@
-"""How numbers are written in print: in the unit that suits them, with the digits they deserve."""
+"""Numbers in print: in a suitable unit, with as many digits as they deserve."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ LONG_TIMES = (
 # Units whose first factor takes a prefix.
 PREFIXED = {"m", "s", "N", "Pa", "J", "m/s", "N/m", "N/s"}
 
-# Sizes from which on, and below which, numbers have an exponent.
+# Range of sizes of numbers without an exponent.
 MAX_PLAIN = 1e6
 MIN_PLAIN = 1e-4
 # Significant digits of an error.
 ERROR_DIGITS = 2
-# An error that is smaller, relative to its value, is none.
+# Minimum error that is written, over its value.
 MIN_ERROR = 1e-12
-# Numbers of a column that differ by a larger factor do not have the same decimals.
+# Maximum ratio of numbers in a column with the same decimals.
 MAX_RANGE = 1e3
 
-# Written where nothing is known.
+# Printed for unknown numbers.
 UNKNOWN = "-"
 
 
 class Scale(NamedTuple):
-    """A unit in which numbers are shown: its name, and its size in SI."""
+    """A unit for print: its name, and its size in SI."""
 
     name: str
     size: float
@@ -44,19 +44,9 @@ class Scale(NamedTuple):
 
 
 def scale_for(max_size: float, unit: str) -> Scale:
-    """The unit in which a quantity of a size is best read.
+    """The unit for quantities up to a size in the SI unit, which is "1" for plain numbers.
 
-    Parameters
-    ----------
-    max_size
-        Largest size that is to be shown, in SI; it is below some thousand in the unit.
-    unit
-        The SI unit, such as "N" or "m/s"; "1" for plain numbers.
-
-    Returns
-    -------
-    Scale
-        With a prefix of the SI, such as "µN"; long times in minutes to years ("a").
+    It has a prefix of the SI, such as "µN"; long times are in minutes to years ("a").
     """
     if unit == "1":
         return Scale("", 1.0)
@@ -76,17 +66,17 @@ def scale_for(max_size: float, unit: str) -> Scale:
 
 
 def _prefix(size: float) -> tuple[str, float]:
-    """The prefix with which a number is between 1 and 1000, as far as there is one; its size."""
+    """The prefix for which a number is between 1 and 1000, if there is one, and its size."""
     if not 0 < size < math.inf:
         return "", 1.0
-    # A little below, so that 999.99999 is not 1000.
+    # With a margin, so that a number just below 1000 is not printed as 1000.
     power = 3 * math.floor(math.log10(size * (1 + 1e-9)) / 3)
     power = min(max(power, min(LETTERS)), max(LETTERS))
     return LETTERS[power], 10.0**power
 
 
 def number(value: float, digits: int = 4) -> str:
-    """A number with as many significant digits; whole numbers in full, a dash for NaN.
+    """A number with significant digits; whole numbers are written in full, and NaN as a dash.
 
     >>> number(0.0123456), number(110695.13), number(12345), number(3.2e-7)
     ('0.01235', '110700', '12345', '3.2e-7')
@@ -95,7 +85,7 @@ def number(value: float, digits: int = 4) -> str:
         return UNKNOWN
     if math.isinf(value):
         return f"{value:g}"
-    # Whole numbers may be of another type, and 0 has no sign.
+    # A float, without the sign of -0.
     value = float(value) + 0.0
     if value.is_integer() and abs(value) < MAX_PLAIN:
         return f"{value:.0f}"
@@ -113,33 +103,26 @@ def _power(value: float) -> int:
 
 
 def _without_zeros(text: str) -> str:
-    """A number with an exponent without its sign and zeros: 3.2e-7 for 3.2e-07."""
+    """A number without leading zeros and plus sign in its exponent: 3.2e-7 for 3.2e-07."""
     mantissa, mark, exponent = text.partition("e")
     return f"{mantissa}e{int(exponent)}" if mark else text
 
 
 def with_unit(value: float, unit: str, digits: int = 4) -> str:
-    """A number in SI in the unit that suits it, such as "18 µN"."""
+    """A number in SI in a suitable unit, such as "18 µN"."""
     scale = scale_for(value, unit)
     if scale.name in {name for *_, name in LONG_TIMES}:
         size = value / scale.size
-        # 4000 s are not 66.67 minutes.
+        # 4000 s are not written as 66.67 min.
         if float(f"{size:.{digits}g}") != size:
             return f"{number(value, digits)} s"
     return f"{number(value / scale.size, digits)} {scale.name}".rstrip()
 
 
 def with_error(value: float, error: float, unit: str = "1", digits: int = 4) -> str:
-    """A number in SI with its error: as many digits as that deserves, in the unit that suits it.
+    """A number in SI with its error, in a suitable unit, with digits according to the error.
 
-    Parameters
-    ----------
-    value, error
-        Both in SI. An error of 0 or NaN is not written.
-    unit
-        The SI unit; "1" for plain numbers.
-    digits
-        Significant digits of a number without error.
+    An error of 0 or NaN is not written; the number then has the given significant digits.
 
     >>> with_error(0.542043, 0.00025), with_error(1.8e-5, 4e-8, "N"), with_error(0.0038, 0.0072)
     ('0.54204 ± 0.00025', '18.000 ± 0.040 µN', '0.0038 ± 0.0072')
@@ -156,34 +139,26 @@ def with_error(value: float, error: float, unit: str = "1", digits: int = 4) -> 
 
 
 def _is_known(error: float | None, value: float) -> bool:
-    """Whether an error is one that can be written."""
+    """Whether an error is known, finite, and not negligible."""
     return error is not None and MIN_ERROR * abs(value) < abs(error) < math.inf
 
 
 def _with_error(value: float, error: float) -> str:
-    """A number and its error, both in the unit in which they are written."""
+    """A number and its error, in the unit for print."""
     max_size = max(abs(value), error)
     if not MIN_PLAIN <= max_size < 100 * MAX_PLAIN:
         power = _power(max_size)
         return f"({_with_error(value / 10.0**power, error / 10.0**power)})e{power}"
-    # Of the error as it is rounded: 0.0996 is 0.10.
+    # Decimals of the rounded error: 0.0996 is 0.10.
     decimals = ERROR_DIGITS - 1 - _power(float(f"{error:.{ERROR_DIGITS - 1}e}"))
     shown = max(decimals, 0)
     return f"{round(value, decimals) + 0.0:.{shown}f} ± {round(error, decimals):.{shown}f}"
 
 
 class Column(NamedTuple):
-    """How the numbers of a column are written: in one unit, with one number of decimals.
+    """The format of numbers in a column: one unit, and one number of decimals.
 
-    Attributes
-    ----------
-    scale
-        The unit of all of them.
-    decimals
-        Digits after the point; None if the numbers are of too different sizes, each with
-        ``digits`` significant ones then.
-    digits
-        Significant digits of the largest.
+    Without decimals, as the numbers are of too different sizes, each has the significant digits.
     """
 
     scale: Scale
@@ -195,7 +170,7 @@ class Column(NamedTuple):
         return self.scale.label(name)
 
     def text(self, value: float | None, error: float | None = None) -> str:
-        """A number in SI as it stands in the column, with its error if that is known."""
+        """A cell for a number in SI, with its error if it is known."""
         if value is None or math.isnan(value):
             return UNKNOWN
         size = value / self.scale.size
@@ -207,20 +182,10 @@ class Column(NamedTuple):
 
 
 def column(values: Iterable[float | None], unit: str, digits: int = 4) -> Column:
-    """How numbers in SI are written in a column.
-
-    Parameters
-    ----------
-    values
-        All of them; those that are None or NaN are not known.
-    unit
-        Their SI unit; "1" for plain numbers.
-    digits
-        Significant digits of the largest.
-    """
+    """The format of a column of numbers in SI; the largest has the given significant digits."""
     sizes = [abs(one) for one in values if one is not None and math.isfinite(one) and one != 0]
     max_size = max(sizes, default=0.0)
-    # Times of a table are not in hours.
+    # Times in columns are at most in seconds.
     scale = scale_for(min(max_size, 599.0) if unit == "s" else max_size, unit)
     shown = [one / scale.size for one in sizes]
     if all(one.is_integer() for one in shown):
@@ -234,5 +199,5 @@ def column(values: Iterable[float | None], unit: str, digits: int = 4) -> Column
 def percent(part: float) -> str:
     """A part as a text such as "2.1 %" or "174 %"."""
     size = 100 * part
-    # Two digits of what is more would have an exponent.
+    # From 99.5 % on, the format with two digits would have an exponent.
     return f"{size:.0f} %" if abs(size) >= 99.5 else f"{size:.2g} %"

@@ -25,7 +25,7 @@ from conftest import ROOT, long
 from mesoslip import Config
 from mesoslip.campaign.plan import Plan
 from mesoslip.command_line.main import app
-from mesoslip.inference.plan import Plan as FitPlan
+from mesoslip.inference.fit_plan import Plan as FitPlan
 from mesoslip.plots.views import VIEWS
 
 DOCS = ROOT / "docs"

@@ -30,7 +30,7 @@ from mesoslip.configuration.contacts.tables import COUPLINGS, INITIAL_STATES
 from mesoslip.configuration.sliders import DEFAULT as DEFAULT_SLIDER
 from mesoslip.configuration.sliders import SLIDERS
 from mesoslip.configuration.threshold_laws import LAWS
-from mesoslip.inference.plan import Plan as FitPlan
+from mesoslip.inference.fit_plan import Plan as FitPlan
 from mesoslip.plots.views import VIEWS
 
 DOCS = ROOT / "docs"

@@ -15,14 +15,14 @@ from mesoslip.errors import ConfigError, FileError
 from mesoslip.execution.stop import Stop, StoppedError
 from mesoslip.execution.store import Store
 from mesoslip.inference import checks, fit_trace, likelihood
-from mesoslip.inference.experiment import prepare
 from mesoslip.inference.features import Feature
-from mesoslip.inference.plan import Plan
+from mesoslip.inference.fit_plan import Plan
 from mesoslip.inference.prior import FreeParameter, Prior
 from mesoslip.inference.rounds import estimate_posterior
 from mesoslip.inference.sampler import draw, r_hat
 from mesoslip.inference.simulations import Simulations, Simulator
 from mesoslip.inference.summaries import Summarizer
+from mesoslip.inference.traced_experiment import prepare
 from scipy.stats import kstest, norm
 
 FREE = {

@@ -12,15 +12,15 @@ from conftest import klein_tables
 from mesoslip.errors import ConfigError, FileError
 from mesoslip.execution.stop import Stop
 from mesoslip.inference import checks, likelihood
-from mesoslip.inference.experiment import Sampling, prepare
 from mesoslip.inference.features import Feature
 from mesoslip.inference.fit import prepare as prepare_all
 from mesoslip.inference.fit import usable_summaries
+from mesoslip.inference.fit_plan import Plan
 from mesoslip.inference.fit_trace import as_plan
 from mesoslip.inference.misfit import sentence
 from mesoslip.inference.noise import Noise, cleaned
-from mesoslip.inference.plan import Plan
 from mesoslip.inference.simulations import Simulations
+from mesoslip.inference.traced_experiment import Sampling, prepare
 from mesoslip.inference.wander import wandering
 from test_fit import FREE, NOISE, SMALL, experiment, fit_tables
 

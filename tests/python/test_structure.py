@@ -286,7 +286,7 @@ PLANTS = {
     "theory": "measured.trace",
     "analysis": "theory.lives",
     "inference": "measured.trace",
-    "plots": "inference.plan",
+    "plots": "inference.fit_plan",
     "reports": "explorer.server",
     "output": "analysis.slips",
     "simulation": "output.layout",

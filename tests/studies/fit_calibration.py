@@ -24,8 +24,8 @@ import mesoslip
 import numpy as np
 from mesoslip.errors import RunError
 from mesoslip.inference.fit import prepare, usable_summaries
+from mesoslip.inference.fit_plan import Plan
 from mesoslip.inference.noise import Noise
-from mesoslip.inference.plan import Plan
 from mesoslip.inference.rounds import estimate_posterior
 from mesoslip.inference.simulations import Simulations
 

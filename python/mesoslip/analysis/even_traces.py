@@ -18,19 +18,14 @@ INTERVAL_TOLERANCE = 1e-3
 
 
 def even_trace(tree: xr.DataTree, realization: int = 0) -> tuple[Array, Array]:
-    """Times [s] and spring force [N] of a realization; see `evenly_sampled`."""
+    """Times [s] and spring force [N] at equal intervals, interpolated where intervals differ."""
     root = tree.to_dataset()
-    time = root["time"].values
     force = root["spring_force"].values[realization].astype(float)
     is_known = np.isfinite(force)
-    return evenly_sampled(time[is_known], force[is_known])
-
-
-def evenly_sampled(time: Array, values: Array) -> tuple[Array, Array]:
-    """Times [s] and values at equal intervals, interpolated linearly where intervals differ."""
+    time, force = root["time"].values[is_known], force[is_known]
     steps = np.diff(time)
     interval = float(np.median(steps))
     if np.all(np.abs(steps - interval) <= INTERVAL_TOLERANCE * interval):
-        return time, values
+        return time, force
     even = time[0] + interval * np.arange(math.floor((time[-1] - time[0]) / interval) + 1)
-    return even, np.interp(even, time, values)
+    return even, np.interp(even, time, force)

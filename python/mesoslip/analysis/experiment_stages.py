@@ -297,7 +297,7 @@ class Experiment:
         }
 
     def mean_of(self, stage: Stage) -> SteadyMean | None:
-        """The steady mean of a stage; None if there is none."""
+        """The steady mean of a stage; None without one."""
         return self.steady_means.get(stage.number)
 
     def slip_share(self, stage: Stage) -> float:

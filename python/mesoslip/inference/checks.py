@@ -17,15 +17,15 @@ Array = NDArray[np.float64]
 
 # Probability below which the model is rejected.
 REJECTED = 0.02
-# Fractions of predicted traces with a summary above, or below, which a trace without it, or with
-# it, disagrees.
+# Fraction of predicted traces with a summary above which a trace without it disagrees, and fraction
+# below which a trace with it disagrees.
 NEARLY_ALL, HARDLY_ANY = 0.95, 0.05
 # Maximum deviation, in spreads, and regularization of a covariance, in mean variances.
 MAX_DEVIATION = 30.0
 RIDGE = 1e-3
 # Standard deviation of the prior on the unit cube.
 PRIOR_DEVIATION = 12**-0.5
-# Shrinkage below which a parameter is not determined, and from which it is determined.
+# Shrinkage below which a parameter is not determined, and above which it is.
 UNDETERMINED, DETERMINED = 0.25, 0.75
 # Correlation above which two parameters are only determined together.
 MAX_CORRELATION = 0.9
@@ -33,33 +33,25 @@ MAX_CORRELATION = 0.9
 MARGIN, MAX_IN_MARGIN = 0.02, 0.1
 # Maximum R-hat of converged chains.
 MAX_R_HAT = 1.05
-# Information of a group over that of the most informative one from which a parameter follows from
-# it too, and maximum number of such groups.
+# Minimum information of a group that a parameter follows from, over that of the most informative
+# one, and maximum number of such groups.
 SHARE = 0.7
 MAX_NEEDED = 2
 
 
 @dataclass(frozen=True)
 class Agreement:
-    """Comparison of traces with predictions.
-
-    Attributes
-    ----------
-    probability
-        Fraction of predicted traces that deviate from the others at least as much as the trace.
-    scores
-        Deviation of each summary from the median prediction, in spreads of the predictions; NaN
-        if they cannot be compared, infinite if it is defined only for one of them.
-    groups
-        For each group of summaries, the fraction of the predictions that deviate as much in it.
-    sentences
-        The disagreements, in words.
-    """
+    """Comparison of traces with predictions."""
 
     probability: float
+    """Fraction of predicted traces that deviate from the others at least as much as the trace."""
     scores: Array
+    """Deviation of each summary from the median prediction, in spreads of the predictions; NaN if
+    they cannot be compared, infinite if it is defined only for one of them."""
     groups: dict[str, float]
+    """For each group of summaries, the fraction of the predictions that deviate as much in it."""
     sentences: tuple[str, ...]
+    """The disagreements, in words."""
 
     @property
     def is_rejected(self) -> bool:
@@ -80,19 +72,10 @@ def compare(
 
     The distance of each group of summaries is Mahalanobis', with the covariance of simulations near
     the posterior, so that unusual combinations of summaries disagree too. Distances are ranked
-    among those of the predictions, without assuming a distribution. The group with the largest
-    disagreement counts, compared with the largest one of each prediction.
+    among those of the predictions, without assuming a distribution. The largest disagreement of a
+    group is compared with the largest one of each prediction.
 
-    Parameters
-    ----------
-    features
-        The summaries.
-    simulated
-        Summaries of simulations near the posterior, shape (simulations, summaries).
-    predicted
-        Summaries of traces predicted by the posterior, shape (traces, summaries).
-    observed
-        Summaries of the trace.
+    Summaries have the shapes (simulations, summaries) and (traces, summaries).
     """
     defined = np.isfinite(predicted).mean(axis=0)
     is_observed = np.isfinite(observed)
@@ -130,7 +113,7 @@ def compare(
     count = len(predicted)
     ranks = (count - np.argsort(np.argsort(own, axis=0), axis=0)) / count
     parts = (1 + np.sum(own >= trace, axis=0)) / (1 + count)
-    # Beyond all others the distance counts too: with many groups some prediction is always the
+    # Distances beyond all others are compared too: with many groups, some prediction is always the
     # farthest one of a group.
     others = np.sort(own, axis=0)[-2:]
     limit = np.where(own >= others[-1], others[0], others[-1])
@@ -140,10 +123,10 @@ def compare(
     probability = (1 + np.sum(is_more)) / (1 + count)
     scores[missing], scores[extra] = -np.inf, np.inf
     found = {groups[index]: float(parts[index]) for index in np.argsort(parts)}
-    for lost in np.flatnonzero(missing | extra).tolist():
-        found[features[lost].group] = 1 / (1 + count)
+    for index in np.flatnonzero(missing | extra).tolist():
+        found[features[index].group] = 1 / (1 + count)
         probability = 1 / (1 + count)
-    # The group whose worst summary is farthest off first.
+    # Equal groups are sorted by their worst summaries.
     worst = {
         group: float(np.nanmax(np.abs(scores[names == group]), initial=0.0)) for group in found
     }
@@ -159,17 +142,14 @@ def compare(
 
 
 def _unusual(distance: Array, limit: Array) -> Array:
-    """How far distances are beyond the farthest of the others, as a logarithm of at least 0."""
+    """Logarithm of distances over the farthest of the others, at least 0."""
     return np.asarray(np.log(np.maximum(distance, 1e-300) / np.maximum(limit, 1e-300)).clip(0))
 
 
 def shrinkage(draws: Array) -> Array:
-    """Shrinkage from prior to posterior, 1 - (standard deviation)/(that of the prior), from 0 to 1.
+    """Shrinkage from prior to posterior by draws on the unit cube, shape (draws, parameters).
 
-    Parameters
-    ----------
-    draws
-        On the unit cube, shape (draws, parameters).
+    It is 1 - (standard deviation)/(that of the prior), from 0 to 1.
     """
     return np.asarray(np.clip(1 - draws.std(axis=0) / PRIOR_DEVIATION, 0, 1))
 
@@ -182,20 +162,8 @@ def information(
 ) -> dict[str, Array]:
     """Information of each group of summaries alone on each parameter.
 
-    Parameters
-    ----------
-    features
-        The summaries.
-    parameters, summaries
-        Of simulations near the posterior.
-    observed
-        Summaries of the trace.
-
-    Returns
-    -------
-    dict
-        For each group, the fraction of the variance of each parameter over the simulations that the
-        group predicts, 0 to 1.
+    It is the fraction of the variance of the parameter over simulations near the posterior that the
+    group predicts, 0 to 1.
     """
     result = {}
     for group in dict.fromkeys(one.group for one in features):
@@ -204,20 +172,15 @@ def information(
         if not np.isfinite(masked).any():
             continue
         statistics = project(summaries, parameters, masked)[1]
-        left = np.var(statistics - parameters, axis=0) / np.var(parameters, axis=0)
-        result[group] = np.clip(1 - left, 0, 1)
+        unexplained = np.var(statistics - parameters, axis=0) / np.var(parameters, axis=0)
+        result[group] = np.clip(1 - unexplained, 0, 1)
     return result
 
 
 def needed_groups(prior: Prior, informed: dict[str, Array]) -> dict[str, tuple[str, ...]]:
     """The groups of summaries that each parameter follows from, the most informative first.
 
-    Parameters
-    ----------
-    prior
-        The free parameters.
-    informed
-        Information of each group, see `information`.
+    ``informed`` is the result of `information`.
     """
     found = {}
     for index, one in enumerate(prior.free):
@@ -235,21 +198,7 @@ def warnings(
     r_hat: Array,
     needs: dict[str, tuple[str, ...]],
 ) -> Iterator[str]:
-    """Warnings on the parameters of a fit.
-
-    Parameters
-    ----------
-    prior
-        The free parameters.
-    draws
-        Draws of the posterior on the unit cube, shape (draws, parameters).
-    agreement
-        Comparison of the traces with predictions.
-    r_hat
-        Agreement of the chains.
-    needs
-        The groups of summaries that each parameter follows from, see `needed_groups`.
-    """
+    """Warnings about the parameters of a fit; ``needs`` is the result of `needed_groups`."""
     if agreement.is_rejected:
         reasons = "; ".join(agreement.sentences)
         yield (

@@ -38,38 +38,26 @@ UNITS: dict[Kind, str] = {
 
 @dataclass(frozen=True)
 class Feature:
-    """A summary.
-
-    Attributes
-    ----------
-    name
-        Name, unique in a fit.
-    group
-        Group of summaries that are compared together.
-    meaning
-        Meaning of the number.
-    kind
-        Meaning of the number, by which `quantity` converts it.
-    label
-        Name of the quantity.
-    high, low
-        Sentences for a model in which it is larger, or smaller, than in the trace; empty if the
-        summary is not mentioned.
-    factor
-        Factor of the quantity, such as the scale of the forces [N].
-    trace
-        Number of the trace.
-    """
+    """A summary."""
 
     name: str
+    """Name, unique in a fit."""
     group: str
+    """Group of summaries that are compared together."""
     meaning: str
+    """Meaning of the number."""
     kind: Kind = "ratio"
+    """Kind of the number, by which `quantity` converts it."""
     label: str = ""
+    """Name of the quantity."""
     high: str = ""
+    """Sentence for a model in which it is larger than in the trace; may be empty."""
     low: str = ""
+    """Sentence for a model in which it is smaller."""
     factor: float = 1.0
+    """Factor of the quantity, such as the scale of the forces [N]."""
     trace: int = 0
+    """Number of the trace."""
 
     @property
     def unit(self) -> str:
@@ -89,15 +77,16 @@ class Feature:
         return bool(self.high)
 
 
-def features(scale: float, *, has_start: bool) -> Iterator[Feature]:
-    """The summaries of a trace in their order.
+def _feature(name: str, group: str, kind: Kind, label: str, high: str, low: str) -> Feature:
+    """A summary that is a quantity or its logarithm."""
+    meaning = f"logarithm of the {label}" if kind.startswith("log") else label
+    return Feature(name, group, meaning, kind, label, high, low)
 
-    Parameters
-    ----------
-    scale
-        Unit of the forces [N].
-    has_start
-        Whether the trace begins with the first loading of a run.
+
+def features(scale: float, *, has_start: bool) -> Iterator[Feature]:
+    """The summaries of a trace in their order, with the unit of the forces [N].
+
+    ``has_start`` is whether the trace begins with the first loading of a run.
     """
     for one in (*_whole(), *(_start() if has_start else ()), *_slips(), *_loading()):
         scaled = one.kind in {"force", "log force", "log rate", "log power"}
@@ -105,10 +94,9 @@ def features(scale: float, *, has_start: bool) -> Iterator[Feature]:
 
 
 def _whole() -> Iterator[Feature]:
-    yield Feature(
+    yield _feature(
         "slip_count",
         "slips",
-        "logarithm of the number of slips",
         "log count",
         "number of slips",
         "slips are too frequent",
@@ -123,20 +111,18 @@ def _whole() -> Iterator[Feature]:
         "the mean force is too high",
         "the mean force is too low",
     )
-    yield Feature(
+    yield _feature(
         "force_deviation",
         "force",
-        "logarithm of the standard deviation of the force",
         "log force",
         "standard deviation of the force",
         "the force varies too much",
         "the force varies too little",
     )
     for one in QUANTILES:
-        yield Feature(
+        yield _feature(
             f"force_quantile_{one}",
             "force",
-            f"{one} % quantile of the force",
             "force",
             f"{one} % quantile of the force",
             _level(one, "high"),
@@ -174,19 +160,17 @@ def _start() -> Iterator[Feature]:
         "force",
         "first force",
     )
-    yield Feature(
+    yield _feature(
         "first_peak",
         "first peak",
-        "force at the first peak",
         "force",
         "force at the first peak",
         "the first peak is too high",
         "the first peak is too low",
     )
-    yield Feature(
+    yield _feature(
         "first_peak_time",
         "first peak",
-        "logarithm of the time of the first peak",
         "log time",
         "time of the first peak",
         "the first peak is too late",
@@ -202,19 +186,17 @@ def _start() -> Iterator[Feature]:
             "the force rises too straight to the first peak",
             "the force bends too early before the first peak",
         )
-    yield Feature(
+    yield _feature(
         "first_drop",
         "first slip",
-        "logarithm of the first force drop",
         "log force",
         "first force drop",
         "the first slip is too deep",
         "the first slip is too shallow",
     )
-    yield Feature(
+    yield _feature(
         "first_rate",
         "first slip",
-        "logarithm of the maximum rate of the first slip",
         "log rate",
         "maximum rate of the first slip",
         "the first slip is too fast",
@@ -309,20 +291,18 @@ def _slips() -> Iterator[Feature]:
         "the force at the start of slips wanders too much",
         "the force at the start of slips wanders too little",
     )
-    yield Feature(
+    yield _feature(
         "return_map",
         "slips",
-        "correlation of each force drop with the next",
         "ratio",
         "correlation of each force drop with the next",
         "each slip resembles the next too much",
         "deep and shallow slips alternate too much",
     )
     for at in WAVEFORM:
-        yield Feature(
+        yield _feature(
             f"waveform_{at:+.2f}",
             "shape of slips",
-            "mean force along slips",
             "force",
             "mean force along slips",
             "the force along slips is too high",
@@ -331,10 +311,9 @@ def _slips() -> Iterator[Feature]:
 
 
 def _loading() -> Iterator[Feature]:
-    yield Feature(
+    yield _feature(
         "stick_slope",
         "loading between slips",
-        "logarithm of the slope of the loading between slips",
         "log rate",
         "slope of the loading between slips",
         "the loading between slips is too steep",

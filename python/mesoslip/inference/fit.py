@@ -16,89 +16,65 @@ from mesoslip.execution.executors import ExecutorLike
 from mesoslip.execution.stop import StopRequest
 from mesoslip.execution.store import Store
 from mesoslip.inference.checks import Agreement, compare, information
-from mesoslip.inference.experiment import Experiment
-from mesoslip.inference.experiment import prepare as prepare_experiment
-from mesoslip.inference.left_out import dominated_by_noise
-from mesoslip.inference.plan import Plan
+from mesoslip.inference.fit_plan import Plan
 from mesoslip.inference.rounds import Estimate, estimate_posterior
 from mesoslip.inference.sampler import check_installed
 from mesoslip.inference.simulations import Simulations, Simulator
+from mesoslip.inference.traced_experiment import Experiment
+from mesoslip.inference.traced_experiment import prepare as prepare_experiment
 
 if TYPE_CHECKING:
     import xarray as xr
 
 Array = NDArray[np.float64]
 
-# Number of predicted traces, also where most simulations have fewer contacts than these.
+# Number of predicted traces, and a smaller one if most simulations have fewer contacts than these.
 PREDICTIONS = 160
 FEW_PREDICTIONS = 100
 # Maximum number of stored samples of a predicted trace.
 MAX_SAMPLES = 3000
+# Number of traces with additional noise.
+TRIALS = 4
+# Maximum change of a summary by doubled noise: of a logarithm of a power, of other logarithms, and
+# of forces in standard deviations of the trace. At these, noise makes about half of the power.
+MAX_POWER_CHANGE = 0.4
+MAX_LOG_CHANGE = 0.2
+MAX_FORCE_CHANGE = 0.2
 
 
 @dataclass(frozen=True)
 class Prediction:
-    """Predictions of one trace by a posterior.
-
-    Attributes
-    ----------
-    experiment
-        The trace.
-    observed_slips
-        Its slips.
-    force
-        Predicted traces, every `stride`-th sample, shape (traces, samples) [N].
-    slips
-        Slips of the predicted traces.
-    stride
-        Distance of the stored samples.
-    """
+    """Predictions of one trace by a posterior."""
 
     experiment: Experiment
     observed_slips: FoundSlips
     force: Array
+    """Predicted traces [N], every `stride`-th sample, shape (traces, samples)."""
     slips: tuple[FoundSlips, ...]
+    """Slips of the predicted traces."""
     stride: int
 
 
 @dataclass(frozen=True)
 class FitResult:
-    """The result of a fit.
-
-    Attributes
-    ----------
-    plan
-        The plan of the fit.
-    simulator
-        The simulator of the experiments.
-    observed
-        Summaries of the traces.
-    left_out
-        Whether each summary is left out, as noise dominates it.
-    estimate
-        The posterior.
-    agreement
-        Comparison of the traces with predictions.
-    information
-        Information of each group of summaries, see `mesoslip.inference.checks.information`.
-    predicted
-        Summaries of predicted traces, shape (traces, summaries).
-    predictions
-        Predictions of each trace.
-    simulations
-        Number of simulations.
-    """
+    """The result of a fit."""
 
     plan: Plan
     simulator: Simulator
     observed: Array
+    """Summaries of the traces."""
     left_out: NDArray[np.bool_]
+    """Whether each summary is left out, as noise dominates it."""
     estimate: Estimate
     agreement: Agreement
     information: dict[str, Array]
+    """Information of each group of summaries, see `mesoslip.inference.checks.information`."""
     predicted: Array
+    """Summaries of predicted traces, shape (traces, summaries)."""
     predictions: tuple[Prediction, ...]
+    """Predictions of each trace."""
     simulations: int
+    """Number of simulations."""
 
 
 def fit(
@@ -111,35 +87,7 @@ def fit(
     progress: Callable[[float], None] | None = None,
     stop: StopRequest | None = None,
 ) -> FitResult:
-    """Fit parameters to traces of one interface.
-
-    Parameters
-    ----------
-    trees
-        Outputs with a trace each; of each the first realization is fitted.
-    names
-        Their names.
-    plan
-        The free parameters, and the known ones.
-    store
-        Folder for finished simulations, so that a stopped fit can be continued; none by default.
-    executor
-        Executor of the simulations, or a number of threads; by default one per processor. The
-        result does not depend on it.
-    progress
-        Called with the fraction of finished simulations.
-    stop
-        A request to stop; Ctrl-C stops too.
-
-    Raises
-    ------
-    FileError, ConfigError
-        If a trace cannot be fitted, or the configuration contradicts it.
-    RunError
-        If too few simulations resemble the traces, or emcee is not installed.
-    mesoslip.execution.stop.StoppedError
-        If the fit is stopped.
-    """
+    """Fit parameters to outputs with a trace each; see `mesoslip.fit`."""
     check_installed()
     simulator = prepare(trees, names, plan)
     observed, left_out = usable_summaries(simulator)
@@ -180,20 +128,14 @@ def fit(
 
 
 def prepare(trees: Sequence[xr.DataTree], names: Sequence[str], plan: Plan) -> Simulator:
-    """The simulator of experiments, with their traces.
-
-    Raises
-    ------
-    FileError, ConfigError
-        See `fit`.
-    """
+    """The simulator of experiments, with their traces."""
     several = len(trees) > 1
     experiments = [
         prepare_experiment(tree, plan, name if several else "", number)
         for number, (tree, name) in enumerate(zip(trees, names, strict=True))
     ]
     if several:
-        # One interface has one correlation length of its strength: the longest is seen best.
+        # One interface has one correlation length of its strength: the longest is measured best.
         length = float(np.max([one.wander_length for one in experiments]))
         experiments = [replace(one, wander_length=length) for one in experiments]
     return Simulator(tuple(experiments), plan.prior, plan.seed, plan.coarse_count)
@@ -201,17 +143,31 @@ def prepare(trees: Sequence[xr.DataTree], names: Sequence[str], plan: Plan) -> S
 
 def usable_summaries(simulator: Simulator) -> tuple[Array, NDArray[np.bool_]]:
     """Summaries of the traces, and whether each is left out, as noise dominates it."""
-    left_out = [dominated_by_noise(one, simulator.seed) for one in simulator.experiments]
+    left_out = [_dominated_by_noise(one, simulator.seed) for one in simulator.experiments]
     return simulator.observed, np.concatenate(left_out)
 
 
-def predict_traces(simulations: Simulations, points: Array) -> tuple[Array, tuple[Prediction, ...]]:
-    """Predicted traces at points of the unit cube.
+def _dominated_by_noise(experiment: Experiment, seed: int) -> NDArray[np.bool_]:
+    """Whether the noise dominates each summary of a trace.
 
-    Returns
-    -------
-    summaries, predictions
-        Summaries of the predicted traces, shape (traces, summaries), and the traces.
+    The noise is doubled: this changes the summary as much as the noise has already changed it.
+    """
+    summarizer = experiment.summarizer
+    observed = summarizer(experiment.force)
+    rng = np.random.default_rng([seed, 3])
+    noisier = np.array([summarizer(experiment.noisier(rng)) for _ in range(TRIALS)])
+    deviation = float(np.std(experiment.force)) / summarizer.scale
+    special = {"log power": MAX_POWER_CHANGE, "force": MAX_FORCE_CHANGE * deviation}
+    limits = np.array([special.get(one.kind, MAX_LOG_CHANGE) for one in summarizer.features])
+    change = np.abs(noisier.mean(axis=0) - observed)
+    is_lost = np.isfinite(observed) & ~np.isfinite(noisier).all(axis=0)
+    return np.asarray((change > limits) | is_lost)
+
+
+def predict_traces(simulations: Simulations, points: Array) -> tuple[Array, tuple[Prediction, ...]]:
+    """Summaries of predicted traces at points of the unit cube, and predictions of each trace.
+
+    The summaries have the shape (traces, summaries).
     """
     simulator = simulations.simulator
     experiments = simulator.experiments

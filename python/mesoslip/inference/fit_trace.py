@@ -8,8 +8,6 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from mesoslip.analysis.even_traces import even_trace
 from mesoslip.analysis.noise import noise_level
 from mesoslip.analysis.sampled_slips import estimated_period
@@ -20,9 +18,9 @@ from mesoslip.errors import FileError
 from mesoslip.execution.executors import ExecutorLike
 from mesoslip.execution.stop import StopRequest
 from mesoslip.inference import fit as fits
-from mesoslip.inference.experiment import MIN_SAMPLES
-from mesoslip.inference.plan import Known, Plan
+from mesoslip.inference.fit_plan import Known, Plan
 from mesoslip.inference.posterior import build_tree
+from mesoslip.inference.traced_experiment import MIN_SAMPLES
 from mesoslip.output.inputs import OutputLike, as_run, several, trace_name
 
 if TYPE_CHECKING:
@@ -48,9 +46,9 @@ def fit(
         as they are known, and all have the free parameters in common.
     config
         The known parameters, and the free ones in a table ``[fit.free]``: a TOML file, nested
-        tables, or a `mesoslip.inference.plan.Plan`. Velocity of the drive, stiffness of the spring
-        and duration are those of the trace where the configuration has none. A mass that is not
-        given is fitted.
+        tables, or a `mesoslip.inference.fit_plan.Plan`. Velocity of the drive, stiffness of the
+        spring and duration are those of the trace where the configuration has none. A mass that is
+        not given is fitted.
     store
         Folder in which each finished simulation is stored, and from which it is read when the fit
         is called again; by default simulations are not stored.
@@ -93,7 +91,7 @@ def fit(
 
 
 def trace_names(outputs: Sequence[OutputLike], trees: Sequence[xr.DataTree]) -> list[str]:
-    """Different names of traces: those of their files, or numbers."""
+    """Unique names of traces: those of their files, with numbers if necessary."""
     names = [trace_name(one, tree) for one, tree in zip(outputs, trees, strict=True)]
     if len(set(names)) == len(names):
         return names
@@ -105,15 +103,7 @@ def as_plan(
     trees: Sequence[xr.DataTree],
     changes: Iterable[Change] = (),
 ) -> Plan:
-    """The plan of a fit from its file or from nested tables, completed from the traces.
-
-    Raises
-    ------
-    FileError
-        If a file cannot be read.
-    ConfigError
-        If it is wrong.
-    """
+    """The plan of a fit from its file or from nested tables, completed from the traces."""
     if isinstance(config, Plan):
         return replace(config, has_several=len(trees) > 1)
     if isinstance(config, Mapping):
@@ -122,7 +112,7 @@ def as_plan(
 
 
 def known_of(trees: Sequence[xr.DataTree]) -> Known:
-    """Properties of the apparatus according to the first trace that has them."""
+    """Properties of the apparatus according to the first trace."""
     tree = trees[0]
     traced = tomllib.loads(tree.attrs["configuration"])
     time = tree.to_dataset()["time"].values
@@ -136,12 +126,11 @@ def known_of(trees: Sequence[xr.DataTree]) -> Known:
         _number(traced, "slider", "stiffness", "N/m"),
         period,
         float(time[-1] - time[0]),
-        float(np.median(np.diff(time))) if len(time) > 1 else math.nan,
         len(trees),
     )
 
 
 def _number(tables: dict[str, Any], table: str, name: str, unit: str) -> float:
-    """A quantity of a configuration in SI; NaN if it is not there."""
+    """A quantity of a configuration in SI; NaN if it is missing."""
     value = tables.get(table, {}).get(name)
     return math.nan if value is None else to_si(value, unit, f"1 {unit}")

@@ -33,7 +33,7 @@ RIDGES = np.geomspace(1e-6, 1e2, 33)
 MAX_LEVERAGE = 1 - 1e-6
 # Minimum number of simulations per coefficient of the polynomial.
 SIMULATIONS_PER_TERM = 8
-# Degrees of freedom of the distributions that are tried, beside the normal one.
+# Degrees of freedom of t distributions; the normal one is a further candidate.
 FREEDOMS = (3.0, 4.0, 6.0, 9.0, 14.0, 25.0)
 # Median of the absolute value of a standard normal deviate.
 NORMAL_MEDIAN = 0.6744897501960817
@@ -75,44 +75,24 @@ def _with_squares(scores: Array, has_squares: bool) -> Array:
 
 
 def usable(summaries: Array, observed: Array) -> NDArray[np.bool_]:
-    """Whether each summary is defined for the trace and for most simulations.
-
-    Parameters
-    ----------
-    summaries
-        Of simulations, shape (simulations, summaries); NaN if undefined.
-    observed
-        Summaries of the trace, shape (summaries,).
-    """
+    """Whether each summary is defined, not NaN, for the trace and for most simulations."""
     finite = np.isfinite(summaries)
     is_common = finite.mean(axis=0) > 0.5
     return np.asarray(np.isfinite(observed) & is_common)
 
 
 def project(summaries: Array, parameters: Array, observed: Array) -> tuple[Projection, Array]:
-    """Learn statistics from simulations.
+    """Learn the projection of summaries to statistics from simulations.
 
-    Parameters
-    ----------
-    summaries
-        Shape (simulations, summaries), without NaN where `usable`.
-    parameters
-        Shape (simulations, parameters).
-    observed
-        Summaries of the trace.
-
-    Returns
-    -------
-    projection, statistics
-        The projection, and the statistics of each simulation by the regression of all others, shape
-        (simulations, parameters).
+    The second result is the statistics of each simulation by the regression of all others, shape
+    (simulations, parameters). `usable` summaries, of shape (simulations, summaries), have no NaN.
     """
     used = usable(summaries, observed)
     values = summaries[:, used]
     centre = np.median(values, axis=0)
     low, high = np.percentile(values, [16, 84], axis=0)
     spread = (high - low) / 2
-    # Constant summaries carry no information.
+    # Constant summaries have no information.
     varies = spread > 1e-9 * (1 + np.abs(centre))
     used = used.copy()
     used[np.flatnonzero(used)[~varies]] = False
@@ -126,12 +106,9 @@ def project(summaries: Array, parameters: Array, observed: Array) -> tuple[Proje
 
 
 def _ridge(scores: Array, parameters: Array) -> tuple[Array, Array, Array]:
-    """Ridge regression; the penalty of each parameter is chosen by leave-one-out validation.
+    """Weights and offset of a ridge regression, and its predictions of left-out simulations.
 
-    Returns
-    -------
-    weights, offset, left_out
-        Coefficients of the regression, and its prediction for each simulation left out.
+    The penalty of each parameter is chosen by leave-one-out validation.
     """
     middle, mean = scores.mean(axis=0), parameters.mean(axis=0)
     left, sizes, right = np.linalg.svd(scores - middle, full_matrices=False)
@@ -154,42 +131,29 @@ def _ridge(scores: Array, parameters: Array) -> tuple[Array, Array, Array]:
 
 @dataclass(frozen=True)
 class Surrogate:
-    """The synthetic likelihood, valid in the region of the simulations it was learnt from.
-
-    Attributes
-    ----------
-    powers
-        Factors of each term of the polynomial: indices of parameters.
-    centre, spread
-        Centre and spread of the parameters, for standardization.
-    coefficients
-        Coefficients of the polynomial, shape (terms, statistics).
-    inverse
-        (X^T X)^-1 of the regression, for the uncertainty of the polynomial.
-    log_scale
-        Coefficients of the logarithm of the standard deviations, shape (1 + parameters,
-        statistics).
-    log_range
-        Minimum and maximum of that logarithm over the simulations, shape (2, statistics).
-    root
-        Cholesky factor of the correlation.
-    freedom
-        Degrees of freedom of the t distribution; infinite for a normal one.
-    validity
-        Coefficients of the log odds that the summaries of the trace are defined for a simulation;
-        None if they always are.
-    """
+    """The synthetic likelihood, valid in the region of the simulations it was learnt from."""
 
     powers: tuple[tuple[int, ...], ...]
+    """Factors of each term of the polynomial: indices of parameters."""
     centre: Array
     spread: Array
+    """Spread of the parameters about their centre, for standardization."""
     coefficients: Array
+    """Coefficients of the polynomial, shape (terms, statistics)."""
     inverse: Array
+    """(X^T X)^-1 of the regression, for the uncertainty of the polynomial."""
     log_scale: Array
+    """Coefficients of the logarithm of the standard deviations, shape (1 + parameters, statistics).
+    """
     log_range: Array
+    """Minimum and maximum of that logarithm over the simulations, shape (2, statistics)."""
     root: Array
+    """Cholesky factor of the correlation."""
     freedom: float
+    """Degrees of freedom of the t distribution; infinite for a normal one."""
     validity: Array | None
+    """Coefficients of the log odds that the summaries of the trace are defined for a simulation;
+    None if they always are."""
 
     @cached_property
     def _unmix(self) -> Array:
@@ -219,16 +183,11 @@ class Surrogate:
         return deviations @ self._unmix, log_scale.sum(axis=-1)
 
     def corrected(self, statistics: Array, parameters: Array) -> Surrogate:
-        """The likelihood with the mean and the width of other simulations.
+        """The likelihood with the mean and the width of simulations with all contacts.
 
         The simulations that it was learnt from have fewer contacts than the interface, so their
         summaries scatter more, and are shifted a little. The errors of shift and width by the
         number of the others are part of the likelihood.
-
-        Parameters
-        ----------
-        statistics, parameters
-            Of simulations with all contacts, shape (simulations, parameters).
         """
         count = len(statistics)
         if count < MIN_CORRECTION:
@@ -250,21 +209,16 @@ class Surrogate:
         return replace(
             self,
             coefficients=coefficients,
-            # The errors of the polynomial are those by the simulations that it was learnt from.
+            # The polynomial keeps its errors by the simulations that it was learnt from.
             inverse=self.inverse / float(np.mean(np.exp(2 * log_width))),
             log_scale=log_scale,
             log_range=self.log_range + log_width,
         )
 
     def log_likelihood(self, statistics: Array, parameters: Array) -> Array:
-        """Logarithm of the synthetic likelihood up to a constant, shape (...,).
+        """Logarithm of the synthetic likelihood of the statistics of a trace, up to a constant.
 
-        Parameters
-        ----------
-        statistics
-            Statistics of the trace, shape (statistics,).
-        parameters
-            Shape (..., parameters).
+        The shape is (...,) for parameters of shape (..., parameters).
         """
         deviations, log_determinant = self.standardized(statistics, parameters)
         distance = np.sum(deviations**2, axis=-1)
@@ -282,15 +236,8 @@ class Surrogate:
 def learn(statistics: Array, parameters: Array, all_parameters: Array) -> Surrogate:
     """Learn the synthetic likelihood.
 
-    Parameters
-    ----------
-    statistics
-        Statistics of the simulations for which the summaries of the trace are defined, shape
-        (simulations, statistics).
-    parameters
-        Their parameters, shape (simulations, parameters).
-    all_parameters
-        Parameters of all simulations of the region, those with the summaries first.
+    Statistics and parameters are those of the simulations for which the summaries of the trace are
+    defined. These simulations are the first of all simulations of the region.
     """
     centre, spread = all_parameters.mean(axis=0), all_parameters.std(axis=0) + 1e-12
     scaled = (parameters - centre) / spread
@@ -301,7 +248,7 @@ def learn(statistics: Array, parameters: Array, all_parameters: Array) -> Surrog
     scale_terms = np.concatenate([np.ones((count, 1)), scaled], axis=1)
     log_scale = np.zeros((1 + size, statistics.shape[1]))
     coefficients = np.empty((len(powers), statistics.shape[1]))
-    # Alternate: the polynomial with the weights, the weights from its residuals.
+    # The polynomial by the weights, and the weights by its residuals, in turn.
     for _ in range(3):
         for index in range(statistics.shape[1]):
             root = np.sqrt(weight[:, index])
@@ -320,7 +267,7 @@ def learn(statistics: Array, parameters: Array, all_parameters: Array) -> Surrog
         weight /= weight.mean(axis=0)
     logs = scale_terms @ log_scale
     standard = residuals / np.exp(logs)
-    # By the median, which a few large deviations do not change.
+    # The median hardly depends on a few large deviations.
     deviation = np.median(np.abs(standard), axis=0) / NORMAL_MEDIAN
     log_scale[0] += np.log(deviation)
     logs = logs + np.log(deviation)
@@ -366,8 +313,8 @@ def _terms(scaled: Array, powers: tuple[tuple[int, ...], ...]) -> Array:
     index = {one: number for number, one in enumerate(powers)}
     for number, one in enumerate(powers):
         # The product of one factor and an earlier term.
-        rest = index.get(one[1:])
-        known = terms[..., rest] if rest is not None else np.prod(scaled[..., list(one[1:])], -1)
+        other = index.get(one[1:])
+        known = terms[..., other] if other is not None else np.prod(scaled[..., list(one[1:])], -1)
         terms[..., number] = scaled[..., one[0]] * known if one else 1.0
     return terms
 
@@ -375,17 +322,8 @@ def _terms(scaled: Array, powers: tuple[tuple[int, ...], ...]) -> Array:
 def _tails(distance: Array, size: int) -> tuple[float, float]:
     """Degrees of freedom and width of a multivariate t distribution, by maximum likelihood.
 
-    Parameters
-    ----------
-    distance
-        Squared distances of the deviations from their mean, shape (deviations,).
-    size
-        Dimensions of a deviation.
-
-    Returns
-    -------
-    freedom, width
-        Degrees of freedom, infinite for a normal distribution, and scale of the deviations.
+    ``distance`` are squared distances of deviations, of dimension ``size``, from their mean. The
+    degrees of freedom of a normal distribution are infinite.
     """
     from scipy.special import gammaln
 

@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 
 # Minimum deviation of a summary that is mentioned, in spreads of the predictions.
 MIN_SCORE = 2.0
-# Maximum number of sentences, and of those on one group.
+# Maximum number of sentences, and of sentences on one group.
 MAX_SENTENCES, MAX_IN_GROUP = 5, 2
 # Digits of the quantities.
 DIGITS = 3
@@ -29,18 +29,8 @@ def sentences(
 ) -> Iterator[str]:
     """The largest disagreements with the model, a sentence for each.
 
-    Parameters
-    ----------
-    features
-        The summaries.
-    groups
-        The groups that disagree, the worst first.
-    scores
-        Deviation of the trace from the predictions in each summary, in spreads.
-    observed
-        Summaries of the trace.
-    predicted
-        Summaries of predictions, shape (traces, summaries).
+    Groups that disagree are in order, the worst first; scores are deviations of the trace from the
+    predictions in spreads.
     """
     named = 0
     for group in groups:
@@ -82,7 +72,7 @@ def sentence(feature: Feature, score: float, observed: float, predicted: Array) 
 
 
 def _unnamed(feature: Feature, score: float) -> str:
-    """A disagreement in a summary that has no words of its own."""
+    """A disagreement in a summary without sentences of its own."""
     if np.isfinite(score) and abs(score) < MIN_SCORE:
         return f"{feature.group}: each quantity is as in the trace, but not all of them together"
     if np.isfinite(score):

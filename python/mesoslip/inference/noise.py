@@ -14,34 +14,25 @@ Array = NDArray[np.float64]
 
 # Relative uncertainty of an estimated noise.
 UNCERTAINTY = 0.1
-# Orders of differences for the noise, and quantile at which they are clipped.
+# Orders of differences for the noise, and quantile at which these are clipped.
 ORDERS = range(1, 8)
 CLIPPED = 0.999
 
 
 @dataclass(frozen=True)
 class Noise:
-    """Noise that is added to simulated traces.
-
-    Attributes
-    ----------
-    white
-        Standard deviation of its white part [N].
-    coloured
-        Standard deviation of its correlated part, an autoregressive process of order 1 [N].
-    correlation_time
-        Correlation time of that part [s].
-    step
-        Digital step of the recorder [N]; 0 without one.
-    uncertainty
-        Relative standard deviation of the amplitude, which differs between simulations.
-    """
+    """Noise that is added to simulated traces."""
 
     white: float
+    """Standard deviation of the white part [N]."""
     coloured: float = 0.0
+    """Standard deviation of the correlated part, an autoregressive process of order 1 [N]."""
     correlation_time: float = 0.0
+    """Correlation time of that part [s]."""
     step: float = 0.0
+    """Digital step of the recorder [N]."""
     uncertainty: float = 0.0
+    """Relative standard deviation of the amplitude, which differs between simulations."""
 
     @property
     def deviation(self) -> float:
@@ -49,17 +40,7 @@ class Noise:
         return math.sqrt(self.white**2 + self.coloured**2 + self.step**2 / 12)
 
     def added(self, force: Array, interval: float, rng: np.random.Generator) -> Array:
-        """A trace with noise.
-
-        Parameters
-        ----------
-        force
-            Samples [N], shape (samples,).
-        interval
-            Mean distance of the samples [s].
-        rng
-            Random numbers.
-        """
+        """A trace [N] with noise, for a mean distance of the samples [s]."""
         amplitude = 1.0
         if self.uncertainty > 0:
             amplitude = math.exp(self.uncertainty * rng.standard_normal())
@@ -83,7 +64,7 @@ class Noise:
         return process
 
     def with_at_least(self, deviation: float) -> tuple[Noise, float]:
-        """Noise of at least a standard deviation [N], and that of the white noise to be added."""
+        """Noise of a minimum standard deviation [N], and that of the additional white noise."""
         missing = deviation**2 - self.deviation**2
         if missing <= 0:
             return self, 0.0
@@ -91,15 +72,7 @@ class Noise:
         return replace(self, white=math.hypot(self.white, more)), more
 
     def averaged(self, block: int, interval: float) -> float:
-        """Standard deviation of the mean of neighbouring samples [N].
-
-        Parameters
-        ----------
-        block
-            Number of samples of a mean.
-        interval
-            Their distance [s].
-        """
+        """Standard deviation of the mean of a number of samples at a distance [s]."""
         quick = (self.white**2 + self.step**2 / 12) / block
         slow = 0.0
         if self.coloured > 0:
@@ -113,24 +86,10 @@ class Noise:
 def cleaned(
     times: Array, force: Array, *, deviation: float | None, is_measured: bool
 ) -> tuple[Array, Noise, tuple[str, ...]]:
-    """A trace without impulses and hum, and the noise that is left.
+    """A trace without impulses and hum, its other noise, and a sentence for each correction.
 
-    Parameters
-    ----------
-    times
-        Times of the samples [s], shape (samples,).
-    force
-        Force [N], shape (samples,).
-    deviation
-        Standard deviation of white noise, if it is given [N].
-    is_measured
-        Whether the trace was measured; of a simulated one nothing is taken off, and its noise is
-        white.
-
-    Returns
-    -------
-    force, noise, sentences
-        The trace, its noise, and what was taken off.
+    A simulated trace is not corrected, and its noise is white. The standard deviation of white
+    noise may be given [N].
     """
     uncertainty = 0.0 if deviation is not None else UNCERTAINTY
     if not is_measured:
@@ -141,7 +100,7 @@ def cleaned(
     if deviation is not None:
         noise = Noise(deviation)
     else:
-        # As their mean square counts in the summaries, also of noise that is not normal.
+        # The mean square contributes to the summaries, also for noise that is not normal.
         white = max(found.deviation, _differences(clean))
         noise = Noise(
             math.sqrt(max(white**2 - found.digital_step**2 / 12, 0.0)),
@@ -157,7 +116,7 @@ def cleaned(
 def _differences(force: Array) -> float:
     """Standard deviation of noise that is not normal, from differences of the trace [N].
 
-    As `noise_level`, but with the mean square of the differences, as the power of the noise counts.
+    It is estimated as by `noise_level`, but from mean squares of the differences.
     """
     found = []
     for order in ORDERS:

@@ -23,8 +23,8 @@ from mesoslip.inference.features import Feature
 from mesoslip.inference.fit import FitResult, Prediction
 from mesoslip.inference.prior import WANDER
 from mesoslip.inference.sampler import r_hat
-from mesoslip.output import variables
 from mesoslip.output.provenance import program_attributes
+from mesoslip.output.variables import SLIPS, Group, Meaning
 from mesoslip.quantities import with_unit
 
 if TYPE_CHECKING:
@@ -32,6 +32,18 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+# Numbers of each summary of a trace.
+SUMMARIES = Group(
+    observed=Meaning("1", "summary of the trace"),
+    predicted_05=Meaning("1", "5 % quantile of the predictions"),
+    predicted_50=Meaning("1", "median of the predictions"),
+    predicted_95=Meaning("1", "95 % quantile of the predictions"),
+    score=Meaning("1", "deviation of the trace, in spreads of the predictions"),
+    drawn=Meaning("1", "summaries of predicted traces"),
+    left_out=Meaning("1", "1 for summaries that are left out, as noise dominates them", np.int8),
+    trace=Meaning("1", "number of the trace", np.int64),
+    factor=Meaning("1", "factor of the quantity, in SI"),
+)
 PERCENTILES = (5.0, 25.0, 50.0, 75.0, 95.0)
 VERDICTS = ("not determined", "narrowed", "determined")
 SLIP_COLUMNS = ("start_time", "end_time", "force_before", "force_after")
@@ -41,35 +53,23 @@ MIN_DIGITS = 3
 
 @dataclass(frozen=True)
 class Row:
-    """A parameter in the table of a fit, in SI.
-
-    Attributes
-    ----------
-    key, unit
-        Dotted key and SI unit.
-    percentiles
-        `PERCENTILES` of the posterior.
-    low, high
-        Ends of the range.
-    shrinkage
-        Shrinkage from prior to posterior, 0 to 1.
-    verdict
-        One of `VERDICTS`.
-    most_informative
-        The group of summaries with the most information on it; "none" if it is not determined.
-    follows_from
-        That group and others with nearly as much information; "none" if it is not determined.
-    """
+    """A parameter in the table of a fit, in SI."""
 
     key: str
     unit: str
     percentiles: tuple[float, ...]
+    """`PERCENTILES` of the posterior."""
     low: float
     high: float
+    """End of the range, as ``low``."""
     shrinkage: float
+    """Shrinkage from prior to posterior, 0 to 1."""
     verdict: str
+    """One of `VERDICTS`."""
     most_informative: str
+    """The group of summaries with the most information on it; "none" if it is not determined."""
     follows_from: str = ""
+    """That group and others with nearly as much information; "none" if it is not determined."""
 
     @property
     def digits(self) -> int:
@@ -87,7 +87,7 @@ def build_tree(fitted: FitResult) -> xr.DataTree:
     Groups ``posterior`` (dimensions chain, draw), ``prior``, ``observed_data``,
     ``posterior_predictive``, named as in ArviZ; ``observed_slips``, ``predicted_slips`` (slip);
     ``summaries`` (summary) of the trace and the predictions; ``parameters`` (parameter), the
-    table. Groups of further traces end in ``_2``, ``_3``.
+    table. The names of groups of other traces end in ``_2``, ``_3``.
     """
     import xarray as xr
 
@@ -155,17 +155,7 @@ def suffix(number: int) -> str:
 
 
 def trace_groups(prediction: Prediction, start: float, number: int) -> dict[str, xr.Dataset]:
-    """Groups of one trace and its predictions.
-
-    Parameters
-    ----------
-    prediction
-        The trace and its predictions.
-    start
-        Time of its first sample [s].
-    number
-        Number of the trace, which is part of the names of the groups.
-    """
+    """Groups of a trace and its predictions, by the time of its first sample [s] and its number."""
     import xarray as xr
 
     experiment = prediction.experiment
@@ -190,12 +180,12 @@ def trace_groups(prediction: Prediction, start: float, number: int) -> dict[str,
 
 
 def _notes(fitted: FitResult) -> Iterator[str]:
-    """Sentences on what was assumed, taken off and left out."""
+    """Sentences on assumptions, corrections, and summaries that are left out."""
     yield from fitted.plan.assumed
     for prediction in fitted.predictions:
         one = prediction.experiment
         name = f"{one.name}: " if one.name else ""
-        yield from (f"{name}{taken}" for taken in one.taken_off)
+        yield from (f"{name}{correction}" for correction in one.corrections)
         if one.sampling.lead:
             lead = with_unit(one.sampling.lead * one.sampling.interval, "s", 2)
             yield (
@@ -236,9 +226,7 @@ def _slips(found: Sequence[FoundSlips], start: float) -> xr.Dataset:
     columns = {name: np.concatenate([getattr(one, name) for one in found]) for name in SLIP_COLUMNS}
     for name in ("start_time", "end_time"):
         columns[name] = columns[name] + start
-    data = {
-        name: variables.SLIPS.variable(name, ("slip",), values) for name, values in columns.items()
-    }
+    data = {name: SLIPS.variable(name, ("slip",), values) for name, values in columns.items()}
     data["trace"] = xr.Variable("slip", owner, {"units": "1", "long_name": "number of the trace"})
     return xr.Dataset(data)
 
@@ -250,20 +238,9 @@ def summaries_group(
     scores: Array,
     left_out: NDArray[np.bool_],
 ) -> xr.Dataset:
-    """The summaries of traces and of their predictions.
+    """The group `SUMMARIES` of traces and of their predictions.
 
-    Parameters
-    ----------
-    features
-        The summaries.
-    observed
-        Those of the traces.
-    predicted
-        Those of predicted traces, shape (traces, summaries).
-    scores
-        Deviations of the traces from the predictions, in spreads of these.
-    left_out
-        Whether each is left out, as noise dominates it.
+    Predicted summaries have the shape (traces, summaries).
     """
     import xarray as xr
 
@@ -272,51 +249,30 @@ def summaries_group(
     low[defined], middle[defined], high[defined] = np.nanpercentile(
         predicted[:, defined], [5, 50, 95], axis=0
     )
-    one = {"units": "1"}
+    numbers = {
+        "observed": observed,
+        "predicted_05": low,
+        "predicted_50": middle,
+        "predicted_95": high,
+        "score": scores,
+        "drawn": predicted,
+        "left_out": left_out.astype(np.int8),
+        "trace": [one.trace for one in features],
+        "factor": [one.factor for one in features],
+    }
+    texts = {
+        name: ("summary", [getattr(one, name) for one in features])
+        for name in ("group", "meaning", "label")
+    }
     return xr.Dataset(
         {
-            "observed": ("summary", observed, one | {"long_name": "summary of the trace"}),
-            "predicted_05": (
-                "summary",
-                low,
-                one | {"long_name": "5 % quantile of the predictions"},
-            ),
-            "predicted_50": ("summary", middle, one | {"long_name": "median of the predictions"}),
-            "predicted_95": (
-                "summary",
-                high,
-                one | {"long_name": "95 % quantile of the predictions"},
-            ),
-            "score": (
-                "summary",
-                scores,
-                one | {"long_name": "deviation of the trace, in spreads of the predictions"},
-            ),
-            "drawn": (
-                ("prediction", "summary"),
-                predicted,
-                one | {"long_name": "summaries of predicted traces"},
-            ),
-            "left_out": (
-                "summary",
-                left_out.astype(np.int8),
-                one | {"long_name": "1 for summaries that are left out, as noise dominates them"},
-            ),
-            "trace": (
-                "summary",
-                [feature.trace for feature in features],
-                one | {"long_name": "number of the trace"},
-            ),
-            "group": ("summary", [feature.group for feature in features]),
-            "meaning": ("summary", [feature.meaning for feature in features]),
-            "label": ("summary", [feature.label for feature in features]),
-            "factor": (
-                "summary",
-                [feature.factor for feature in features],
-                one | {"long_name": "factor of the quantity, in SI"},
-            ),
+            **{
+                name: SUMMARIES.variable(name, ("prediction", "summary")[-np.ndim(one) :], one)
+                for name, one in numbers.items()
+            },
+            **texts,
         },
-        {"summary": [feature.name for feature in features]},
+        {"summary": [one.name for one in features]},
     )
 
 
@@ -356,7 +312,8 @@ def table(tree: xr.DataTree) -> list[Row]:
     for index, key in enumerate(data["parameter"].values.tolist()):
         one = data.isel(parameter=index)
         part = one["shrinkage"].item()
-        verdict = VERDICTS[int(part >= UNDETERMINED) + int(part >= DETERMINED)]
+        is_known = part >= UNDETERMINED
+        verdict = VERDICTS[int(is_known) + int(part >= DETERMINED)]
         best = int(np.argmax(one["information"].values))
         rows.append(
             Row(
@@ -367,10 +324,8 @@ def table(tree: xr.DataTree) -> list[Row]:
                 one["high"].item(),
                 part,
                 verdict,
-                str(data["feature_group"].values[best]) if part >= UNDETERMINED else "none",
-                ", ".join(str(one["follows_from"].item()).split("\n"))
-                if part >= UNDETERMINED
-                else "none",
+                str(data["feature_group"].values[best]) if is_known else "none",
+                ", ".join(str(one["follows_from"].item()).split("\n")) if is_known else "none",
             )
         )
     return rows

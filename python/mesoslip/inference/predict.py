@@ -16,12 +16,12 @@ from mesoslip.errors import FileError
 from mesoslip.execution.executors import ExecutorLike
 from mesoslip.execution.stop import StopRequest
 from mesoslip.inference.checks import compare
-from mesoslip.inference.experiment import prepare
 from mesoslip.inference.fit import PREDICTIONS, predict_traces, usable_summaries
-from mesoslip.inference.plan import Plan
+from mesoslip.inference.fit_plan import Plan
 from mesoslip.inference.posterior import summaries_group, trace_groups
 from mesoslip.inference.prior import WANDER, FreeParameter, Prior
 from mesoslip.inference.simulations import Simulations, Simulator
+from mesoslip.inference.traced_experiment import prepare
 from mesoslip.output.inputs import OutputLike, as_run, open_output, trace_name
 
 if TYPE_CHECKING:
@@ -67,9 +67,9 @@ def predict(
     Returns
     -------
     xarray.DataTree
-        The posterior as it was, with the groups of the predicted trace instead of those of the
-        traces that it was fitted to. Attribute ``agreement_probability`` is the fraction of
-        predictions that deviate from the others at least as much as the trace.
+        The posterior, with the groups of the predicted trace instead of those of the fitted traces.
+        Attribute ``agreement_probability`` is the fraction of predictions that deviate from the
+        others at least as much as the trace.
 
     Raises
     ------
@@ -125,13 +125,7 @@ def predict(
 
 
 def as_posterior(posterior: OutputLike) -> xr.DataTree:
-    """A result of `fit`.
-
-    Raises
-    ------
-    FileError
-        If it is none.
-    """
+    """A result of `fit`, open or from its file."""
     import xarray as xr
 
     tree = posterior if isinstance(posterior, xr.DataTree) else open_output(posterior)
@@ -163,22 +157,15 @@ def prior_of(posterior: xr.DataTree) -> Prior:
 
 @dataclass(frozen=True)
 class Score:
-    """Predictive score of a fit.
-
-    Attributes
-    ----------
-    log_density
-        Logarithm of the predictive density of the summaries of the traces, up to a constant that
-        the compared fits have in common.
-    difference
-        That of the best fit minus it; 0 for the best one.
-    error
-        Standard error of the difference, by the number of predictions.
-    """
+    """Predictive score of a fit."""
 
     log_density: float
+    """Logarithm of the predictive density of the summaries of the traces, up to a constant that the
+    compared fits have in common."""
     difference: float
+    """The score of the best fit minus this one."""
     error: float
+    """Standard error of the difference, by the number of predictions."""
 
 
 def compare_fits(posteriors: Sequence[OutputLike]) -> list[Score]:

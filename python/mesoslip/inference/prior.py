@@ -17,31 +17,18 @@ WANDER = "fit.wander"
 
 @dataclass(frozen=True)
 class FreeParameter:
-    """A free parameter: a key of a configuration, and its range.
-
-    Attributes
-    ----------
-    key
-        Dotted name, such as "contacts.delay".
-    low, high
-        Ends of the range, in SI.
-    is_logarithmic
-        Whether the prior is uniform in the logarithm.
-    unit
-        SI unit, such as "N/m"; "1" for plain numbers.
-    is_whole
-        Whether the parameter is a whole number.
-    is_nuisance
-        Whether it is no key of the configuration.
-    """
+    """A free parameter: a dotted key of a configuration, and its range in SI."""
 
     key: str
     low: float
     high: float
     is_logarithmic: bool = False
+    """Whether the prior is uniform in the logarithm."""
     unit: str = "1"
     is_whole: bool = False
+    """Whether the parameter is a whole number."""
     is_nuisance: bool = False
+    """Whether the key is not part of a configuration."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +75,7 @@ class Prior:
         }
 
     def nuisances(self, values: Array) -> dict[str, float]:
-        """Values of the parameters that are no keys of the configuration."""
+        """Values of the parameters that are not keys of the configuration."""
         return {
             one.key: float(value)
             for one, value in zip(self.free, values, strict=True)

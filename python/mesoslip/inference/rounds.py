@@ -21,8 +21,8 @@ from mesoslip.inference.simulations import Simulations
 
 Array = NDArray[np.float64]
 
-# Fractions of the simulations in the first round and in each of the next ones, minimum numbers, and
-# the maximum fraction until the region is final.
+# Fractions of the simulations in the first round and in each of the next ones, their minimum
+# numbers, and the maximum fraction before the region is final.
 FIRST, NEXT = 0.16, 0.12
 MIN_FIRST, MIN_NEXT = 100, 60
 MAX_SEARCH = 0.65
@@ -37,13 +37,13 @@ INSIDE = 0.98
 # Draws of each chain during the search and at the end, and chains at the end.
 ROUGH, FINE = 500, 1000
 CHAINS = 4
-# Number of starting points of a chain.
+# Maximum number of starting points of a chain.
 STARTS = 40
 # Minimum number of simulations for a likelihood.
 MIN_VALID = 40
 # Factor by which the limit of a region with fewer simulations is increased.
 GROWTH = 1.5
-# Simulations with all contacts, where the others have fewer: fraction of all, and minimum number.
+# Simulations with all contacts, if the others have fewer: fraction of all, and minimum number.
 EXACT = 0.05
 MIN_EXACT = 60
 # Minimum width of the region on the unit cube.
@@ -52,14 +52,14 @@ MIN_WIDTH = 1e-6
 
 @dataclass(frozen=True)
 class Region:
-    """An ellipsoid on the unit cube; the whole cube if it has no centre."""
+    """An ellipsoid on the unit cube: centre, inverse covariance, and maximum squared distance."""
 
     centre: Array
     inverse: Array
     limit: float
 
     def contains(self, points: Array) -> NDArray[np.bool_]:
-        """Whether each point lies in the region; points of shape (points, parameters)."""
+        """Whether each point, of shape (points, parameters), lies in the region."""
         inside = self.distance(points) <= self.limit
         return np.asarray(inside & np.all((points >= 0) & (points <= 1), axis=1))
 
@@ -80,30 +80,21 @@ class Region:
 
 @dataclass(frozen=True)
 class Estimate:
-    """The posterior after a round.
-
-    Attributes
-    ----------
-    chains
-        Draws from the posterior on the unit cube, shape (chains, draws, parameters).
-    projection, surrogate, statistics
-        The synthetic likelihood, and the statistics of the trace.
-    coverage
-        Fractions of the simulations inside the 50 % and the 90 % regions of the likelihood.
-    parameters, summaries
-        Those of the simulations it was learnt from.
-    ratio
-        Width of their region over that of the posterior, the maximum over the parameters.
-    """
+    """The posterior after a round."""
 
     chains: Array
+    """Draws from the posterior on the unit cube, shape (chains, draws, parameters)."""
     projection: Projection
     surrogate: Surrogate
     statistics: Array
+    """Statistics of the trace."""
     coverage: tuple[float, float]
+    """Fractions of the simulations inside the 50 % and the 90 % regions of the likelihood."""
     parameters: Array
     summaries: Array
+    """Those of the simulations that the likelihood was learnt from."""
     ratio: float
+    """Width of their region over that of the posterior, the maximum over the parameters."""
 
     @property
     def draws(self) -> Array:
@@ -114,24 +105,7 @@ class Estimate:
 def estimate_posterior(
     simulations: Simulations, observed: Array, total: int, rng: np.random.Generator
 ) -> Estimate:
-    """The posterior after all rounds.
-
-    Parameters
-    ----------
-    simulations
-        The simulations so far; more are added.
-    observed
-        Summaries of the trace.
-    total
-        Total number of simulations.
-    rng
-        Random numbers.
-
-    Raises
-    ------
-    RunError
-        If too few simulations resemble the trace.
-    """
+    """The posterior after all rounds, which add simulations up to a total number."""
     from scipy.stats import qmc
 
     size = len(simulations.simulator.prior)
@@ -147,19 +121,19 @@ def estimate_posterior(
     count = 1
     while True:
         estimate = fit_region(simulations, observed, region, rng)
-        left = total - len(simulations)
+        remaining = total - len(simulations)
         is_final = count >= MIN_ROUNDS and estimate.ratio < MAX_RATIO
         if is_final or len(simulations) + each > MAX_SEARCH * total:
             break
-        points = around(estimate.draws, min(each, left), rng)
+        points = around(estimate.draws, min(each, remaining), rng)
         region = Region.around(points)
         simulations.add(points)
         count += 1
-    # In two rounds, the second from the improved posterior.
+    # Two last rounds, the second from the improved posterior.
     exact = max(MIN_EXACT, round(EXACT * total)) // 2 if simulations.has_coarse else 0
     for part in (0.5, 1.0):
-        left = total - len(simulations) - round(exact / part)
-        points = around(estimate.draws, max(1, round(part * left)), rng)
+        remaining = total - len(simulations) - round(exact / part)
+        points = around(estimate.draws, max(1, round(part * remaining)), rng)
         if len(points) > 2 * size:
             region = Region.around(points)
         simulations.add(points)
@@ -192,13 +166,7 @@ def fit_region(
     chain_count: int = 1,
     draws: int = ROUGH,
 ) -> Estimate:
-    """The posterior from the simulations of a region; None for the whole cube.
-
-    Raises
-    ------
-    RunError
-        If too few simulations resemble the trace.
-    """
+    """The posterior from the simulations of a region; None for the whole cube."""
     parameters, summaries = simulations.parameters, simulations.summaries
     is_coarse = simulations.is_coarse if simulations.has_coarse else np.full(len(parameters), True)
     exact = parameters[~is_coarse], summaries[~is_coarse]
@@ -246,10 +214,7 @@ def _inside(
 ) -> tuple[NDArray[np.bool_], Array, Array, Region | None]:
     """Simulations of a region, which is enlarged until enough have the summaries of the trace.
 
-    Returns
-    -------
-    valid, parameters, summaries, region
-        Whether each simulation has the summaries of the trace; the simulations; the region.
+    The results are whether each simulation has these summaries, parameters, summaries, and region.
     """
     while True:
         inside = np.full(len(parameters), True) if region is None else region.contains(parameters)
@@ -263,7 +228,7 @@ def _inside(
 def _near(
     parameters: Array, summaries: Array, projection: Projection, region: Region | None
 ) -> tuple[Array, Array]:
-    """Statistics and parameters of simulations in a region; of the nearest ones if it has few."""
+    """Statistics and parameters of simulations in a region, or of the nearest ones."""
     valid = np.all(np.isfinite(summaries[:, projection.used]), axis=1)
     parameters, summaries = parameters[valid], summaries[valid]
     if region is not None:

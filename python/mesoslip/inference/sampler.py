@@ -12,18 +12,12 @@ from mesoslip.errors import RunError
 
 Array = NDArray[np.float64]
 
-# Walkers of an ensemble, burn-in, and steps between draws.
+# Number of walkers of an ensemble, of steps of burn-in, and of steps between draws.
 WALKERS, BURN_IN, THIN = 100, 120, 15
 
 
 def check_installed() -> None:
-    """Check that emcee is installed, before any simulation.
-
-    Raises
-    ------
-    RunError
-        If emcee is not installed.
-    """
+    """Check that emcee is installed, before any simulation."""
     if find_spec("emcee") is None:
         raise RunError("a fit needs the package emcee: pip install 'mesoslip[fit]', or make setup")
 
@@ -36,25 +30,10 @@ def draw(
     chains: int,
     draws: int,
 ) -> Array:
-    """Draw from a density on the unit cube by ensembles of walkers (emcee).
+    """Draw from a density on the unit cube by independent ensembles of walkers (emcee).
 
-    Parameters
-    ----------
-    log_density
-        Logarithm of the density of points of shape (points, parameters); -inf outside its support.
-    start
-        Starting points with a density above 0, shape (points, parameters).
-    rng
-        Random numbers.
-    chains
-        Number of independent ensembles.
-    draws
-        Number of draws of each.
-
-    Returns
-    -------
-    numpy.ndarray
-        Shape (chains, draws, parameters).
+    The result has the shape (chains, draws, parameters). Starting points, of shape (points,
+    parameters), have a density above 0; the logarithm of the density is -inf outside its support.
     """
     import emcee
 

@@ -17,9 +17,9 @@ from mesoslip.execution.pool import Function, Result
 from mesoslip.execution.program import program
 from mesoslip.execution.stop import Stop, StoppedError, StopRequest
 from mesoslip.execution.store import Store
-from mesoslip.inference.experiment import Experiment
 from mesoslip.inference.features import Feature
 from mesoslip.inference.prior import Prior
+from mesoslip.inference.traced_experiment import Experiment
 
 Array = NDArray[np.float64]
 
@@ -29,24 +29,13 @@ Piece = tuple[int, Array, bool]
 
 @dataclass(frozen=True)
 class Simulator:
-    """Simulates experiments with one interface, with noise, and reduces them to summaries.
-
-    Attributes
-    ----------
-    experiments
-        The apparatus with their traces.
-    prior
-        Priors of the free parameters.
-    seed
-        Seed of the fit.
-    coarse_count
-        Number of contacts of a simulation with few of them; None if there are none.
-    """
+    """Simulates experiments with one interface, with noise, and reduces them to summaries."""
 
     experiments: tuple[Experiment, ...]
     prior: Prior
     seed: int
     coarse_count: int | None = None
+    """Number of contacts in most simulations; None if all have that of the interface."""
 
     @cached_property
     def features(self) -> tuple[Feature, ...]:
@@ -72,18 +61,7 @@ class Simulator:
     def forces(self, piece: Piece, stop: StopRequest) -> list[Array] | None:
         """Noisy traces of the force [N], one an experiment; None if they cannot be simulated.
 
-        Parameters
-        ----------
-        piece
-            The number of the simulation, which determines its random numbers, its parameters, and
-            whether it has few contacts.
-        stop
-            A request to stop.
-
-        Raises
-        ------
-        StoppedError
-            If it is stopped.
+        The number of the simulation determines its random numbers.
         """
         number, unit, is_coarse = piece
         values = self.prior.values(unit)
@@ -126,32 +104,10 @@ class Simulator:
 
 
 class Simulations:
-    """Simulations one after another, each with its number.
+    """The simulations of a fit so far, each with its number, of an expected total.
 
     They are determined by the seed and the trace, so that a fit that is started again requests the
     same simulations and finds those in its store.
-
-    Parameters
-    ----------
-    simulator
-        The simulator.
-    expected
-        Number of simulations of the whole fit.
-    store
-        Where they are kept; nowhere by default.
-    executor
-        Where they are computed; on as many threads as there are processors by default.
-    progress
-        Called with the fraction of the simulations that is done.
-    stop
-        A request to stop.
-
-    Attributes
-    ----------
-    parameters, summaries
-        Of all simulations so far, shapes (simulations, parameters), (simulations, summaries).
-    is_coarse
-        Whether each simulation has few contacts.
     """
 
     def __init__(
@@ -182,14 +138,17 @@ class Simulations:
 
     @property
     def is_coarse(self) -> NDArray[np.bool_]:
+        """Whether each simulation has few contacts."""
         return np.array(self._is_coarse, dtype=bool)
 
     @property
     def parameters(self) -> Array:
+        """Shape (simulations, parameters)."""
         return np.array(self._parameters).reshape(-1, len(self.simulator.prior))
 
     @property
     def summaries(self) -> Array:
+        """Shape (simulations, summaries)."""
         return np.array(self._summaries).reshape(-1, len(self.simulator.features))
 
     def __len__(self) -> int:
@@ -198,17 +157,8 @@ class Simulations:
     def add(self, points: Array, *, exact: bool = False) -> None:
         """Simulate at points of the unit cube, shape (points, parameters).
 
-        Parameters
-        ----------
-        points
-            The points.
-        exact
-            Whether the simulations have all contacts.
-
-        Raises
-        ------
-        StoppedError
-            If the fit is stopped; what was simulated is kept.
+        If ``exact``, the simulations have all contacts. A stopped fit keeps finished simulations in
+        its store.
         """
         start, is_coarse = len(self), self.has_coarse and not exact
         found = {}
@@ -232,14 +182,9 @@ class Simulations:
         self._is_coarse += [is_coarse] * len(points)
 
     def forces(self, points: Array) -> Iterator[list[Array]]:
-        """Noisy traces at points of the unit cube, with numbers after those of all others.
+        """Noisy traces at points of the unit cube, with all contacts.
 
-        All contacts are simulated.
-
-        Raises
-        ------
-        StoppedError
-            If the fit is stopped.
+        The numbers of these simulations are beyond all others.
         """
         first = self._expected + len(self)
         pieces = [(number, point, False) for number, point in enumerate(points, first)]
@@ -262,7 +207,7 @@ class Simulations:
             raise StoppedError("the fit was stopped")
 
     def _read(self, number: int, point: Array) -> Array | None:
-        """Summaries of a stored simulation; None if it is not there, or of other parameters."""
+        """Summaries of a stored simulation; None if it is missing or has other parameters."""
         name = _name(number)
         body = self._store.read(name) if self._store is not None and name in self._stored else None
         try:
@@ -279,5 +224,5 @@ def _name(number: int) -> str:
 
 
 def _texts(values: Array) -> list[str]:
-    """Numbers as Python writes them, which are read to the bit."""
+    """Numbers as texts, from which they are read to the bit."""
     return [repr(float(one)) for one in values]

@@ -1,7 +1,7 @@
 """Summaries of a trace, independent of the phase of its slips.
 
-After some slips a trace depends on single contacts: two runs with the same parameters have the same
-statistics only. The first loading, peak and slip of N contacts differ from those of the master
+After some slips a trace depends on single contacts: two runs with the same parameters only have the
+same statistics. The first loading, peak and slip of N contacts differ from those of the master
 equation by N^(-1/2) only, and are summarized point by point, along the waveform of the slip.
 """
 
@@ -47,30 +47,20 @@ TINY = 1e-12
 
 @dataclass(frozen=True)
 class Summarizer:
-    """Computes the summaries of traces with the same sampling.
-
-    Attributes
-    ----------
-    time
-        Times of the samples [s] from the start of the run, at equal intervals.
-    noise
-        Standard deviation of the noise of the force [N].
-    period
-        Period of the setup for finding slips [s], the same for every trace.
-    scale
-        Unit of the forces [N], such as the maximum of the measured trace.
-    direction
-        Sign of the drive's velocity.
-    has_start
-        Whether the trace begins with the first loading of the run.
-    """
+    """Computes the summaries of traces with the same sampling."""
 
     time: Array
+    """Times of the samples [s] from the start of the run, at equal intervals."""
     noise: float
+    """Standard deviation of the noise of the force [N]."""
     period: float
+    """Period of the setup for finding slips [s], the same for every trace."""
     scale: float
+    """Unit of the forces [N], such as the maximum of the measured trace."""
     direction: float = 1.0
+    """Sign of the drive's velocity."""
     has_start: bool = True
+    """Whether the trace begins with the first loading of the run."""
 
     @cached_property
     def features(self) -> tuple[Feature, ...]:
@@ -202,7 +192,7 @@ class Summarizer:
         for name, column in columns.items():
             values[f"mean_{name}"] = float(np.mean(column))
             values[f"median_{name}"] = float(np.median(column))
-            # A sampled duration may have no spread.
+            # Sampled durations may be equal.
             values[f"spread_{name}"] = math.log(float(np.std(column)) + 1e-3)
         changes = float(np.std(np.diff(before[later]))) / math.sqrt(2)
         values["wander"] = math.log((float(np.std(before[later])) + TINY) / (changes + TINY))
@@ -226,7 +216,7 @@ class Summarizer:
         slopes, creep = [], []
         for number in range(max(start, 1), len(found)):
             first, last = int(found.last[number - 1]), int(found.first[number])
-            # After the ringing, where there is time for that.
+            # After the ringing, if there is time.
             settled = min(first + round(2 * self.period / self._interval), (first + last) // 2)
             ends = [settled + part * (last - settled) for part in LINEAR_PART]
             low, high = math.ceil(ends[0]), math.floor(ends[1])

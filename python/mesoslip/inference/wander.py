@@ -2,7 +2,7 @@
 
 It is a nuisance: a random force, added to simulated traces, that depends on the displacement of
 the drive. It is normal, with a correlation exp(-x^2/(2 l^2)) over a distance x, and the same size
-everywhere. Its amplitude is fitted, its correlation length l is that of the measured trace.
+everywhere. Its amplitude is fitted; its correlation length l is that of the measured trace.
 """
 
 from __future__ import annotations
@@ -27,19 +27,7 @@ MAX_LENGTHS = 1000
 def wandering(
     drive: Array, length: float, rng: np.random.Generator, *, starts_at_zero: bool
 ) -> Array:
-    """A random force of variance 1 along the track.
-
-    Parameters
-    ----------
-    drive
-        Displacement of the drive [m], shape (samples,).
-    length
-        Correlation length [m].
-    rng
-        Random numbers.
-    starts_at_zero
-        Whether it is 0 at the first sample.
-    """
+    """A random force of variance 1 at displacements of the drive [m], by correlation length [m]."""
     from scipy.ndimage import gaussian_filter1d
 
     low, high = float(drive.min()), float(drive.max())
@@ -60,17 +48,8 @@ def wandering(
 def measured_length(summarizer: Summarizer, force: Array, velocity: float) -> float:
     """Correlation length of the slow variation of a measured force [m].
 
-    It is the distance over which the correlation of the force, averaged over some slips, falls to
-    one half, as that of a normal curve.
-
-    Parameters
-    ----------
-    summarizer
-        Finds the slips.
-    force
-        The trace [N].
-    velocity
-        Velocity of the drive [m/s].
+    It is that of a normal curve that falls to one half at the same distance as the correlation of
+    the force, averaged over some slips.
     """
     from scipy.ndimage import uniform_filter1d
 

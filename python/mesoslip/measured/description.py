@@ -163,9 +163,9 @@ class TraceDescription(Table):
     velocity: Velocity | None = None
     """Velocity of the drive, where no load point was recorded."""
     hum: Frequency | None = None
-    """Frequency of a hum to take off."""
+    """Frequency of a hum that is removed."""
     trend: Literal["none", "linear"] | None = None
-    """Trend of the friction with displacement, taken off for rates and states."""
+    """Trend of the friction with displacement, removed for rates and states."""
     noise: Noise | None = None
     """Standard deviation of the noise; estimated by default."""
     min_fall: Fall | None = None

@@ -213,7 +213,7 @@ class _Body:
         return [self._number(number, *one) for one in enumerate(cells[: layout.count])]
 
     def _number(self, line: int, column: int, cell: str) -> float:
-        """The number of a cell; NaN if there is none."""
+        """The number of a cell; NaN without one."""
         decimal = self.layout.decimal
         if is_number(cell, decimal):
             value = float(cell.replace(",", "."))

@@ -35,39 +35,26 @@ MASS_FACTOR = 4.0
 
 @dataclass(frozen=True)
 class Plan:
-    """The plan of a fit.
-
-    Attributes
-    ----------
-    config
-        The known parameters; its values of the free keys are not used.
-    prior
-        The free parameters.
-    noise
-        Standard deviation of the noise of the force [N]; None to estimate it.
-    after
-        Time from which the trace is used [s]; at 0 the first loading and slip are used too.
-    simulations
-        Number of simulations.
-    seed
-        Seed of all random numbers of the fit.
-    simulated_contacts
-        Number of contacts of most simulations, where the interface has at least twice as many.
-    has_several
-        Whether several traces are fitted, each with its own drive and spring.
-    assumed
-        Sentences on what the configuration does not say.
-    """
+    """The plan of a fit."""
 
     config: Config
+    """The known parameters; its values of the free keys are not used."""
     prior: Prior
+    """The free parameters."""
     noise: float | None = None
+    """Standard deviation of the noise of the force [N]; estimated by default."""
     after: float = 0.0
+    """Time from which the trace is used [s]; at 0 the first loading and slip are used too."""
     simulations: int = 1600
+    """Number of simulations."""
     seed: int = 1
+    """Seed of all random numbers of the fit."""
     simulated_contacts: int = 4000
+    """Number of contacts in most simulations, if the interface has at least twice as many."""
     has_several: bool = False
+    """Whether several traces are fitted, each with its own drive and spring."""
     assumed: tuple[str, ...] = ()
+    """Assumptions beyond the configuration, a sentence each."""
 
     @classmethod
     def load(
@@ -78,21 +65,7 @@ class Plan:
     ) -> Plan:
         """Read a configuration file with a table [fit].
 
-        Parameters
-        ----------
-        path
-            The file.
-        overrides
-            Changes of its keys.
-        known
-            Properties of the apparatus according to the traces, used where the file has none.
-
-        Raises
-        ------
-        FileError
-            If a file cannot be read.
-        ConfigError
-            If the configuration is invalid; all errors at once.
+        Known properties of the apparatus according to the traces replace missing keys.
         """
         path = Path(path)
         return cls._checked(override(read_toml(path), overrides).tables, str(path), known)
@@ -104,7 +77,7 @@ class Plan:
         source: str = "configuration",
         known: Known | None = None,
     ) -> Plan:
-        """A fit given as nested tables; see `load`."""
+        """The plan in nested tables; see `load`."""
         return cls._checked(on_base(tables, source, Path()).tables, source, known)
 
     @classmethod
@@ -177,33 +150,20 @@ def _place(tables: dict[str, Any], one: FreeParameter) -> None:
 
 @dataclass(frozen=True)
 class Known:
-    """Properties of the apparatus according to the traces.
-
-    Attributes
-    ----------
-    velocity
-        Velocity of the drive [m/s]; NaN if unknown.
-    stiffness
-        Stiffness of the spring [N/m]; NaN if unknown.
-    period
-        Period of the setup as estimated from the slips [s]; infinite if unknown.
-    duration, interval
-        Length and sampling of the trace [s].
-    traces
-        Number of traces.
-    """
+    """Properties of the apparatus according to the traces, in SI; NaN if unknown."""
 
     velocity: float
     stiffness: float
     period: float
+    """Period of the setup as estimated from the slips; infinite if unknown."""
     duration: float
-    interval: float
     traces: int = 1
+    """Number of traces."""
 
     def complete(self, tables: dict[str, Any], free: list[FreeParameter]) -> list[str]:
-        """Add missing keys of the apparatus to a configuration; returns what is assumed.
+        """Add missing keys of the apparatus to a configuration; returns the assumptions.
 
-        A mass that is neither given nor free is fitted, around that of the period of the slips.
+        A mass that is neither given nor free becomes free, around that of the period of the slips.
         """
         names = {one.key for one in free}
         drive = tables.setdefault("drive", {})
@@ -226,7 +186,7 @@ class Known:
         try:
             stiffness = to_si(slider.get("stiffness", self.stiffness), "N/m", "97 N/m")
         except ValueError:
-            # Reported with the other errors of the configuration.
+            # The stiffness is reported with the other errors of the configuration.
             return []
         if not math.isfinite(self.period * stiffness):
             return []
@@ -257,7 +217,7 @@ class _Reader:
     def quantity(
         self, table: Mapping[str, Any], name: str, unit: str, example: str
     ) -> float | None:
-        """A quantity that is not negative; None by default."""
+        """A quantity that is not negative, if it is given."""
         if name not in table:
             return None
         value = self._si(f"fit.{name}", table[name], unit, example)
@@ -357,7 +317,7 @@ class _Reader:
 
 
 def _flat(table: Mapping[str, Any], outer: str = "") -> Iterable[tuple[str, Any]]:
-    """The entries of a table with dotted keys, given dotted or nested."""
+    """The entries of a table of dotted or nested keys, by dotted key."""
     for key, value in table.items():
         name = f"{outer}{key}"
         is_range = not isinstance(value, Mapping) or not all(

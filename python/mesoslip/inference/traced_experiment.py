@@ -1,4 +1,4 @@
-"""A measured trace, its apparatus, and simulations that are sampled and disturbed as it was."""
+"""A measured trace, its apparatus, and simulations with the same sampling and noise."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from mesoslip.analysis.sampled_slips import estimated_period
 from mesoslip.configuration.config import Config
 from mesoslip.errors import ConfigError, FileError, Problem, RunError
 from mesoslip.execution.stop import StoppedError, StopRequest
+from mesoslip.inference.fit_plan import Plan
 from mesoslip.inference.noise import Noise, cleaned
-from mesoslip.inference.plan import Plan
 from mesoslip.inference.prior import WANDER
 from mesoslip.inference.summaries import Summarizer
 from mesoslip.inference.wander import measured_length, wandering
@@ -29,20 +29,20 @@ if TYPE_CHECKING:
     import xarray as xr
 
 Array = NDArray[np.float64]
-# Numbers that determine random numbers.
+# Seeds of random numbers.
 Words = NDArray[np.unsignedinteger[Any]]
 
-# Minimum noise over the maximum force. It is added to measured and simulated traces with less, as
-# experiments resolve no smaller differences.
+# Minimum noise over the maximum force. Noise is added to traces with less, as experiments do not
+# resolve smaller differences.
 MIN_NOISE = 5e-4
 # Minimum number of samples of a trace.
 MIN_SAMPLES = 200
 # Maximum relative difference between a trace and its configuration.
 MAX_DIFFERENCE = 0.01
-# Samples in a period of the setup to which faster samples are averaged.
+# Minimum number of samples in a period of the setup after averaging.
 SAMPLES_PER_PERIOD = 24
-# Initial force over the maximum one above which a measured trace does not begin with the first
-# loading, and loadings to the maximum force that a simulation is ahead of it.
+# Minimum initial force, over the maximum force, of a trace that does not begin with the first
+# loading, and time that a simulation starts before such a trace, in loadings to the maximum force.
 LOADED = 0.1
 LEAD_LOADINGS = 2.0
 # Maximum number of breaks in a simulation, far more than a trace can have.
@@ -51,24 +51,16 @@ MAX_BREAKS = 3e7
 
 @dataclass(frozen=True)
 class Sampling:
-    """Sampling of a trace, from the start of the drive.
-
-    Attributes
-    ----------
-    times
-        Times of the samples [s], increasing, the first one 0.
-    start
-        Time from which samples are used [s].
-    block
-        Number of samples of which the mean is used.
-    lead
-        Number of samples that a simulation starts before the first sample.
-    """
+    """Sampling of a trace, from the start of the drive."""
 
     times: Array
+    """Times of the samples [s], increasing from 0."""
     start: float = 0.0
+    """Time from which samples are used [s]."""
     block: int = 1
+    """Number of samples in a mean."""
     lead: int = 0
+    """Number of samples that a simulation starts before the first sample."""
 
     @cached_property
     def interval(self) -> float:
@@ -95,16 +87,13 @@ class Sampling:
 
     @cached_property
     def time(self) -> Array:
-        """Times of the samples that are used, counted from the first one [s]."""
+        """Times of the used samples, from the first one [s]."""
         even = self._even[self._skipped :]
         count = len(even) // self.block
         return np.asarray(even[: count * self.block : self.block] - even[0]) if count else even[:0]
 
     def reduced(self, force: Array) -> Array:
-        """Samples at equal distances, averaged over blocks, without those before the start.
-
-        Unequal distances are interpolated linearly, of measured and simulated traces alike.
-        """
+        """Means of samples from the start on, at equal distances by linear interpolation."""
         if not self.is_even:
             force = np.interp(self._even, self.times, force)
         kept = force[self._skipped :]
@@ -115,7 +104,7 @@ class Sampling:
         return mean
 
     def sampled(self, force: Array) -> Array:
-        """Samples of a simulated trace at equal distances, at the times of this sampling."""
+        """Samples at the times of this sampling, from a simulated trace at equal distances."""
         force = force[self.lead :]
         if self.is_even:
             return force[: len(self.times)]
@@ -130,36 +119,20 @@ class Sampling:
 
 @dataclass(frozen=True)
 class Experiment:
-    """An apparatus with a measured trace.
-
-    Attributes
-    ----------
-    name
-        Name of the trace.
-    config
-        Configuration of the known parameters of this apparatus.
-    sampling
-        Sampling of the trace.
-    noise
-        Noise of its force.
-    summarizer
-        Reduces a trace to its summaries.
-    wander_length
-        Correlation length of the strength along the track [m].
-    force
-        The measured force as it is compared, shape (samples,) [N].
-    taken_off
-        Corrections of the trace, a sentence each.
-    """
+    """An apparatus with a measured trace."""
 
     name: str
     config: Config
+    """The known parameters of this apparatus."""
     sampling: Sampling
     noise: Noise
     summarizer: Summarizer
     wander_length: float
+    """Correlation length of the strength along the track [m]."""
     force: Array
-    taken_off: tuple[str, ...] = ()
+    """The measured force [N], corrected and reduced by the sampling."""
+    corrections: tuple[str, ...] = ()
+    """Corrections of the trace, a sentence each."""
 
     def simulated(
         self,
@@ -170,21 +143,8 @@ class Experiment:
     ) -> Array | None:
         """A noisy trace of the force [N], as `force`; None if it cannot be simulated.
 
-        Parameters
-        ----------
-        changes
-            Values of the free keys.
-        nuisances
-            Values of parameters that are no keys.
-        words
-            Three numbers that determine the random numbers.
-        stop
-            A request to stop.
-
-        Raises
-        ------
-        StoppedError
-            If it is stopped.
+        ``changes`` are values of the free keys, ``nuisances`` of other parameters, and three
+        ``words`` determine the random numbers.
         """
         try:
             config = self.config.replace({**changes, "run.seed": int(words[0]) >> 2})
@@ -212,30 +172,13 @@ class Experiment:
         return self.sampling.reduced(noisy)
 
     def noisier(self, rng: np.random.Generator) -> Array:
-        """The measured trace with as much noise again [N]."""
+        """The measured trace with doubled noise [N]."""
         extra = self.noise.added(np.zeros(len(self.sampling.times)), self.sampling.interval, rng)
         return self.force + self.sampling.reduced(extra)
 
 
 def prepare(tree: xr.DataTree, plan: Plan, name: str = "", number: int = 0) -> Experiment:
-    """An experiment from its output.
-
-    Parameters
-    ----------
-    tree
-        The output; its first realization is used.
-    plan
-        The known parameters.
-    name
-        Name of the trace.
-    number
-        Number of the trace in the fit.
-
-    Raises
-    ------
-    FileError, ConfigError
-        If the trace cannot be fitted, or the configuration contradicts it.
-    """
+    """An experiment from the first realization of an output, by number of the trace in the fit."""
     if "spring_force" not in tree.data_vars:
         if "friction_coefficient" in tree.data_vars:
             raise FileError(
@@ -254,10 +197,10 @@ def prepare(tree: xr.DataTree, plan: Plan, name: str = "", number: int = 0) -> E
         raise FileError(f"{_named(name)}the trace has {len(time)} samples")
     sampling = Sampling(time - time[0], plan.after)
     interval = sampling.interval
-    left = len(sampling.time)
-    if left < MIN_SAMPLES:
+    count = len(sampling.time)
+    if count < MIN_SAMPLES:
         raise FileError(
-            f"{_named(name)}the trace has {left} samples"
+            f"{_named(name)}the trace has {count} samples"
             + (f" after {plan.after:g} s" if plan.after else "")
             + f"; a fit needs at least {MIN_SAMPLES}"
         )
@@ -265,7 +208,7 @@ def prepare(tree: xr.DataTree, plan: Plan, name: str = "", number: int = 0) -> E
     if scale == 0:
         raise FileError(f"{_named(name)}the force of the trace is 0 throughout")
     is_measured = tree.attrs.get("origin") == "measured"
-    force, noise, taken_off = cleaned(
+    force, noise, corrections = cleaned(
         sampling.times, force, deviation=plan.noise, is_measured=is_measured
     )
     scale = float(np.max(np.abs(force)))
@@ -281,7 +224,7 @@ def prepare(tree: xr.DataTree, plan: Plan, name: str = "", number: int = 0) -> E
     whole = Sampling(sampling.times)
     period = _period(plan, config, whole.time, whole.reduced(force), noise.deviation)
     block = max(1, math.floor(period / interval / SAMPLES_PER_PERIOD))
-    block = min(block, max(1, left // MIN_SAMPLES))
+    block = min(block, max(1, count // MIN_SAMPLES))
     sampling = replace(sampling, block=block, lead=lead)
     reduced = sampling.reduced(force)
     summarizer = Summarizer(
@@ -295,7 +238,7 @@ def prepare(tree: xr.DataTree, plan: Plan, name: str = "", number: int = 0) -> E
     length = math.nan
     if WANDER in plan.prior.keys:
         length = measured_length(summarizer, reduced, abs(velocity))
-    return Experiment(name, config, sampling, noise, summarizer, length, reduced, taken_off)
+    return Experiment(name, config, sampling, noise, summarizer, length, reduced, corrections)
 
 
 def _is_loaded(force: Array, scale: float) -> bool:
@@ -315,13 +258,7 @@ def _named(name: str) -> str:
 
 
 def _configured(config: Config, sampling: Sampling, name: str) -> Config:
-    """The configuration with the sampling of a trace.
-
-    Raises
-    ------
-    FileError
-        If the drive of the configuration is shorter than the trace.
-    """
+    """The configuration with the sampling of a trace, which must not exceed the drive."""
     count, interval = sampling.simulated_count, sampling.interval
     if config.drive.parts and config.duration < (count - 1.5) * interval:
         raise FileError(
@@ -333,7 +270,7 @@ def _configured(config: Config, sampling: Sampling, name: str) -> Config:
         "output": {"interval": interval, "slip_interval": 0.0},
     }
     if not config.drive.parts:
-        # Longer by half an interval, so that rounding does not lose the last sample.
+        # Half an interval more, so that the last sample is not lost by rounding.
         changes["run"]["duration"] = (count - 0.5) * interval
     tables = config.to_dict()
     tables["output"] = {}
@@ -353,16 +290,12 @@ def _period(plan: Plan, config: Config, time: Array, force: Array, noise: float)
 def _checked(tree: xr.DataTree, plan: Plan) -> Config:
     """The configuration of the apparatus of a trace.
 
-    Of several traces each has the drive and the spring that it was recorded with.
-
-    Raises
-    ------
-    ConfigError
-        If one trace and its configuration contradict each other.
+    If there are several traces, each has the drive and the spring that it was recorded with. A
+    single trace must not contradict the configuration.
     """
     traced = tomllib.loads(tree.attrs["configuration"])
     free, problems, own = set(plan.prior.keys), [], {}
-    # Further keys of a simulated trace are not compared: an experiment has none.
+    # Other keys of a simulated trace are not compared: a measured trace does not have them.
     for table, name in (("drive", "velocity"), ("slider", "stiffness")):
         measured = traced.get(table, {}).get(name)
         given = getattr(getattr(plan.config, table), name, None)

@@ -31,7 +31,13 @@ from mesoslip.explorer.movies import (
     movie_of,
     recorded_for_movie,
 )
-from mesoslip.explorer.pictures import Measured, Theories, motion, theory
+from mesoslip.explorer.pictures import (
+    Measured,
+    Theories,
+    curve_alone,
+    motion,
+    with_steady_sliding,
+)
 from mesoslip.explorer.session import Session
 from mesoslip.explorer.stages import read_stages
 from mesoslip.output.tree import build_tree
@@ -53,6 +59,10 @@ STARTS = {
     "slider.layer_damping": ("slider.kind=layered", "slider.layers=4"),
     "slider.damping": ("slider.damping_ratio=none", "slider.damping=20 1/s"),
 }
+
+
+def theory(config):
+    return with_steady_sliding(config, curve_alone(config))
 
 
 @pytest.fixture

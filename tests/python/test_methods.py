@@ -13,9 +13,9 @@ from kinds import KINDS, configuration
 from mesoslip.configuration.differences import in_one_unit
 from mesoslip.output.kinds import KINDS as OUTPUTS
 from mesoslip.reports.content import Subject
-from mesoslip.reports.methods import curve_method, onset_method, run_method
+from mesoslip.reports.method_paragraphs import METHODS, curve_method, onset_method, run_method
 from mesoslip.reports.references import CITATION, PROGRAM, REFERENCES, numbered
-from mesoslip.reports.sections.methods import METHODS, methods
+from mesoslip.reports.sections.methods import methods
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -23,14 +23,14 @@ def test_every_kind_has_a_paragraph(kind):
     config = configuration(kind)
     tree = xr.DataTree(xr.Dataset(attrs={"energy_residual": 2.2e-13}))
     for write in (run_method, curve_method, onset_method):
-        text = write(tree, config)
+        text = " ".join(write(tree, config))
         cited = {key.strip(" @") for found in CITATION.findall(text) for key in found.split(";")}
         assert cited <= {PROGRAM, *REFERENCES}
         assert {PROGRAM, "braun2011"} <= cited
         assert "None" not in text
         assert "  " not in text
         assert text.endswith(".")
-    text = run_method(tree, config)
+    text = " ".join(run_method(tree, config))
     assert ("infinitely many" in text) == (config.run.engine == "me")
     assert (f"N = {config.contacts.count}" in text) == (config.run.engine == "eq")
     assert ("grow with age" in text or "of young" in text) == (config.contacts.ageing is not None)
@@ -44,7 +44,8 @@ def test_every_kind_of_output_has_a_paragraph():
 
 
 def test_numbers_of_kleins_case():
-    text = run_method(xr.DataTree(), mesoslip.Config.load(ROOT / "runs" / "klein.toml"))
+    config = mesoslip.Config.load(ROOT / "runs" / "klein.toml")
+    text = " ".join(run_method(xr.DataTree(), config))
     for part in ("N = 4080", "18 µN", "2 kN/m", "η = 2e11 1/s", "τ_d = 500 µs", "f_b = 0.1 f_s"):
         assert part in text
     for part in ("gaussian law", "of 0.01", "1.47 g", "97 N/m", "η_S = 51.3", "100 nm/s for 12 s"):

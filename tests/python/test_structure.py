@@ -282,7 +282,7 @@ def test_threshold_laws_are_the_same_on_both_sides():
 # Wrong imports that were made: a file of the room that may not, and what it imports.
 PLANTS = {
     "explorer": "campaign.sweep_plan",
-    "campaign": "reports.page",
+    "campaign": "reports.report",
     "theory": "measured.trace",
     "analysis": "theory.lives",
     "inference": "measured.trace",

@@ -23,7 +23,18 @@ from mesoslip.quantities import with_unit
 STEPS = 200
 # Name of the choice that omits a table.
 NONE = "none"
-# Threshold laws that are made of a width alone.
+# Headings on the page of the keys of tables.
+GROUPS = {
+    "drive": "Drive and run",
+    "run": "Drive and run",
+    "slider": "Slider",
+    "contacts": "Contacts",
+    "contacts.threshold": "Thresholds",
+    "contacts.ageing": "Ageing",
+    "contacts.thermal": "Temperature",
+    "interaction": "Interaction",
+}
+# Threshold laws that need no more than a width.
 WIDTH_LAWS = tuple(name for name, law in LAWS.items() if not law.is_sampled)
 # Couplings that need no table of stiffnesses.
 RULES = tuple(name for name in COUPLINGS if name != "table")
@@ -31,45 +42,31 @@ RULES = tuple(name for name in COUPLINGS if name != "table")
 
 @dataclass(frozen=True)
 class Control:
-    """A key with a control.
-
-    Attributes
-    ----------
-    key
-        Dotted name of the key.
-    label
-        Name on the page.
-    group
-        Heading under which it stands.
-    decades
-        Range to each side of the value at the start, in powers of ten; 0 for a linear range.
-    range
-        Ends of a linear range, or bounds of a logarithmic one, in SI.
-    usual
-        Center of a logarithmic range if the value at the start is zero, in SI.
-    choices
-        Possible values of a key that is no number.
-    choice_labels
-        Names of choices on the page, if other than in a file.
-    required
-        Keys that a choice requires, with their default values.
-    is_text
-        Whether it is a list, which is written in words.
-    is_switch
-        Whether it is a table, of which a choice gives the keys.
-    """
+    """A key with a control on the page; values are in SI."""
 
     key: str
     label: str
-    group: str
     decades: float = 0.0
+    """Range to each side of the value at the start, in powers of ten; 0 for a linear range."""
     range: tuple[float, float] = (0.0, math.inf)
+    """Ends of a linear range, or bounds of a logarithmic one."""
     usual: float = 1.0
+    """Center of a logarithmic range if the value at the start is zero."""
     choices: tuple[str, ...] = ()
     choice_labels: Mapping[str, str] = field(default_factory=dict)
+    """Names of choices on the page, if other than in a file."""
     required: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+    """Keys that a choice requires, with their default values."""
     is_text: bool = False
+    """Whether it is a list, which is written in words."""
     is_switch: bool = False
+    """Whether it is a table, of which a choice gives the keys."""
+
+    @property
+    def group(self) -> str:
+        """Heading of the table of the key."""
+        tables = [table for table in GROUPS if f"{self.key}.".startswith(f"{table}.")]
+        return GROUPS[max(tables, key=len)]
 
     @property
     def unit(self) -> str:
@@ -84,13 +81,7 @@ class Control:
         return kind is not None and kind.is_whole
 
     def scale(self, start: object) -> Scale:
-        """The scale of its slider, given the value at the start.
-
-        Raises
-        ------
-        TypeError
-            If it has choices, or is a text.
-        """
+        """The scale of its slider, given the value at the start; a `TypeError` if it has none."""
         if self.choices or self.is_text:
             raise TypeError(f"{self.key} has no range")
         given = float(start) if isinstance(start, int | float) and start else self.usual
@@ -149,9 +140,9 @@ MAX_RATIO_KEPT, MAX_RATIO = 2.0, 1.2
 
 
 def lattice_size(count: int, lattice: str) -> tuple[int, int]:
-    """Columns and rows of a lattice of N contacts, or of the nearest number that has one.
+    """Columns and rows of a lattice of N contacts whose sides differ by a factor of 2 at most.
 
-    Its sides differ by a factor of 2 at most. Where N has no such lattice they are nearly equal.
+    If N has none, the lattice is nearly square, and its number of contacts the nearest one.
     """
     height = ROW_HEIGHTS[lattice]
     step = 2 if lattice == "triangular" else 1
@@ -170,7 +161,7 @@ def lattice_size(count: int, lattice: str) -> tuple[int, int]:
     return min(nearly, key=lambda pair: (abs(pair[0] * pair[1] - count), ratio(*pair)))
 
 
-# Activation that a switch brings: f_T/f_s, and the temperature [K] at which it is that.
+# Activation of contacts that are switched to it: f_T/f_s at a temperature [K].
 ACTIVATION_RATIO = 0.04
 ROOM_TEMPERATURE = 300.0
 
@@ -182,47 +173,42 @@ def activation_length(config: Config) -> str:
 
 
 CONTROLS = (
-    Control("drive.velocity", "drive velocity", "Drive and run", 3),
-    Control("drive.stage", "stages of the drive", "Drive and run", is_text=True),
-    Control("run.duration", "duration", "Drive and run", 1),
-    Control("run.seed", "seed", "Drive and run", range=(1, 100)),
+    Control("drive.velocity", "drive velocity", 3),
+    Control("drive.stage", "stages of the drive", is_text=True),
+    Control("run.duration", "duration", 1),
+    Control("run.seed", "seed", range=(1, 100)),
     Control(
         "run.engine",
         "contacts are",
-        "Drive and run",
         choices=("eq", "me"),
         choice_labels={"eq": "N, one by one", "me": "N → ∞, the master equation"},
     ),
     Control(
         "slider.kind",
         "kind",
-        "Slider",
         # A slider under a force needs another drive, which has no knob.
         choices=tuple(name for name, slider in SLIDERS.items() if not slider.takes_forces),
         required={"layered": {"slider.layers": "8"}},
     ),
-    Control("slider.stiffness", "spring K", "Slider", 2),
-    Control("slider.mass", "mass M", "Slider", 2),
-    Control("slider.damping_ratio", "damping η_S/Ω_S", "Slider", range=(0, 2)),
-    Control("slider.damping", "damping rate η_S", "Slider", 2, usual=10.0),
-    Control("slider.layer_damping", "damping of layers", "Slider", 2, usual=10.0),
-    Control("slider.layers", "layers", "Slider", range=(1, 64)),
-    Control("contacts.count", "number N", "Contacts", 2, (10, 1e6)),
-    Control("contacts.static_force", "static force F_s", "Contacts", 1),
-    Control("contacts.stiffness", "stiffness Nk", "Contacts", 1.5),
-    Control("contacts.delay", "delay τ_d", "Contacts", 2, usual=1e-3),
-    Control("contacts.back_force_ratio", "back force f_b/f_s", "Contacts", range=(0, 0.9)),
-    Control("contacts.drag_rate", "drag rate η", "Contacts", 5, usual=1e11),
-    Control("contacts.coupling", "coupling", "Contacts", choices=RULES),
-    Control("contacts.initial", "at the start", "Contacts", choices=tuple(INITIAL_STATES)),
-    Control("contacts.threshold.law", "law", "Thresholds", choices=WIDTH_LAWS),
-    Control(
-        "contacts.threshold.relative_width", "width Δf_s/f_s", "Thresholds", 2, (1e-3, 1), 0.01
-    ),
+    Control("slider.stiffness", "spring K", 2),
+    Control("slider.mass", "mass M", 2),
+    Control("slider.damping_ratio", "damping η_S/Ω_S", range=(0, 2)),
+    Control("slider.damping", "damping rate η_S", 2, usual=10.0),
+    Control("slider.layer_damping", "damping of layers", 2, usual=10.0),
+    Control("slider.layers", "layers", range=(1, 64)),
+    Control("contacts.count", "number N", 2, (10, 1e6)),
+    Control("contacts.static_force", "static force F_s", 1),
+    Control("contacts.stiffness", "stiffness Nk", 1.5),
+    Control("contacts.delay", "delay τ_d", 2, usual=1e-3),
+    Control("contacts.back_force_ratio", "back force f_b/f_s", range=(0, 0.9)),
+    Control("contacts.drag_rate", "drag rate η", 5, usual=1e11),
+    Control("contacts.coupling", "coupling", choices=RULES),
+    Control("contacts.initial", "at the start", choices=tuple(INITIAL_STATES)),
+    Control("contacts.threshold.law", "law", choices=WIDTH_LAWS),
+    Control("contacts.threshold.relative_width", "width Δf_s/f_s", 2, (1e-3, 1), 0.01),
     Control(
         "contacts.ageing.law",
         "law",
-        "Ageing",
         choices=(NONE, "log", "relax"),
         choice_labels={"log": "thresholds grow as a logarithm", "relax": "thresholds relax"},
         required={
@@ -239,16 +225,13 @@ CONTROLS = (
             },
         },
     ),
-    Control("contacts.ageing.time", "time τ_a", "Ageing", 3, usual=1e-3),
-    Control("contacts.ageing.growth", "growth β", "Ageing", 1.5, usual=0.05),
-    Control("contacts.ageing.young_force_ratio", "young force over old", "Ageing", range=(0.05, 1)),
-    Control(
-        "contacts.ageing.young_relative_width", "width of the young", "Ageing", 1, (1e-3, 1), 0.1
-    ),
+    Control("contacts.ageing.time", "time τ_a", 3, usual=1e-3),
+    Control("contacts.ageing.growth", "growth β", 1.5, usual=0.05),
+    Control("contacts.ageing.young_force_ratio", "young force over old", range=(0.05, 1)),
+    Control("contacts.ageing.young_relative_width", "width of the young", 1, (1e-3, 1), 0.1),
     Control(
         "contacts.thermal",
         "contacts break",
-        "Temperature",
         choices=(NONE, "force_ratio", "temperature"),
         choice_labels={
             NONE: "at their thresholds",
@@ -271,29 +254,13 @@ CONTROLS = (
         },
         is_switch=True,
     ),
-    Control("contacts.thermal.rate", "rate at the threshold ω_0", "Temperature", 3, usual=1e4),
-    Control(
-        "contacts.thermal.force_ratio",
-        "force f_T/f_s",
-        "Temperature",
-        1.5,
-        (1e-3, 1),
-        ACTIVATION_RATIO,
-    ),
-    Control(
-        "contacts.thermal.temperature", "temperature T", "Temperature", 1, usual=ROOM_TEMPERATURE
-    ),
-    Control(
-        "contacts.thermal.activation_length",
-        "activation length x_a",
-        "Temperature",
-        1.5,
-        usual=1e-10,
-    ),
+    Control("contacts.thermal.rate", "rate at the threshold ω_0", 3, usual=1e4),
+    Control("contacts.thermal.force_ratio", "force f_T/f_s", 1.5, (1e-3, 1), ACTIVATION_RATIO),
+    Control("contacts.thermal.temperature", "temperature T", 1, usual=ROOM_TEMPERATURE),
+    Control("contacts.thermal.activation_length", "activation length x_a", 1.5, usual=1e-10),
     Control(
         "interaction.lattice",
         "lattice",
-        "Interaction",
         choices=(NONE, *LATTICES),
         # Columns, rows and N follow from the number of contacts, see `lattice_size`.
         required={
@@ -301,13 +268,13 @@ CONTROLS = (
             for name in LATTICES
         },
     ),
-    Control("interaction.strength", "strength ξ", "Interaction", range=(0, 1)),
-    Control("interaction.columns", "columns", "Interaction", range=(4, 200)),
-    Control("interaction.rows", "rows", "Interaction", range=(4, 200)),
+    Control("interaction.strength", "strength ξ", range=(0, 1)),
+    Control("interaction.columns", "columns", range=(4, 200)),
+    Control("interaction.rows", "rows", range=(4, 200)),
 )
 BY_KEY = {control.key: control for control in CONTROLS}
 
-# Controls of whole tables: they are shown without the table too.
+# Controls of whole tables, which are shown without the table too.
 TABLE_CONTROLS = ("contacts.ageing.law", "interaction.lattice")
 SWITCHES = tuple(control.key for control in CONTROLS if control.is_switch)
 

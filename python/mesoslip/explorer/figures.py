@@ -21,20 +21,20 @@ from mesoslip.explorer.live_run import Pace
 from mesoslip.explorer.pictures import Lattice, Line, Motion, Theory
 from mesoslip.quantities import with_unit
 
-# Time between two snapshots of a moving lattice [ms].
+# Time between two snapshots of an animated lattice [ms].
 FRAME_MILLISECONDS = 120
 # Colors of N contacts, and of infinitely many.
 FIRST, SECOND = "#1f3b6f", "#c2571a"
-# Room for the numbers of an axis, so that axes one below the other are of one length [px].
+# Room for the numbers of an axis, so that axes below each other have the same length [px].
 LEFT, RIGHT = 64, 12
-# Reports that a picture was drawn: figures draw in the next frame of the browser.
+# Reports that a picture was drawn, which figures do in the next frame of the browser.
 ACKNOWLEDGE = """
 requestAnimationFrame(() => requestAnimationFrame(() => { drawn.tags = [...cb_obj.tags] }))
 """
 
 
 class Plot:
-    """A picture of lines, each with a source of its own."""
+    """A picture of lines, each with its own source."""
 
     def __init__(
         self, name: str, title: str, colors: dict[str, str], height: int = 175, **style: Any
@@ -88,25 +88,8 @@ class Plot:
 class MotionView:
     """Pictures of a run: force, velocity and detached contacts, and a slip in close-up.
 
-    Attributes
-    ----------
-    title, summary, plots
-        Heading, regime and numbers, and the figures.
-    now
-        Line at the time of the lattice that is shown.
-    pace
-        Lets a run send the next picture when this one is drawn.
-
-    Parameters
-    ----------
-    prefix
-        Prefix of the names of its models.
-    title, color
-        Heading, and color of the lines.
-    drawn
-        Called when the browser has drawn a picture.
-    has_trace
-        Whether a measured trace is drawn beside the force.
+    The names of its models begin with the prefix. `drawn` is called when the browser has drawn a
+    picture.
     """
 
     def __init__(
@@ -122,6 +105,7 @@ class MotionView:
         self._range = Range1d(start=0, end=1)
         self.title = Div(text=f"<b>{html.escape(title)}</b>", name=f"{prefix}title")
         self.summary = Div(text="", name=f"{prefix}regime", sizing_mode="stretch_width")
+        # The time of the lattice that is shown.
         self.now = Span(location=0, dimension="height", line_color="gray", visible=False)
         self.force = Plot(
             f"{prefix}force",
@@ -211,7 +195,7 @@ class TheoryView:
         if not shown.curve.is_empty:
             force = shown.curve.y
             span = float(np.nanmax(force) - min(0.0, np.nanmin(force))) or 1.0
-            # The line of a stiff spring leaves the picture.
+            # The line of a stiff spring may leave the picture.
             low, high = min(0.0, float(np.nanmin(force))) - 0.05 * span, float(np.nanmax(force))
             high, end = high + 0.1 * span, float(shown.curve.x[-1])
             set_changed(

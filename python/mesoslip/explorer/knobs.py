@@ -16,7 +16,7 @@ from mesoslip.explorer.stages import EXAMPLE
 
 # Widths of a knob, and of its field [px].
 WIDTH, FIELD_WIDTH = 260, 104
-# Low fields, with a title that may be longer than the field.
+# Low fields, whose titles may be longer.
 FLAT = """
 .bk-input { height: 26px; min-height: 26px; padding: 0 6px; }
 label, .bk-input-group > label { white-space: nowrap; overflow: visible; }
@@ -30,9 +30,7 @@ PLAIN: dict[str, str | None] = {"color": "inherit"}
 
 
 def set_changed(model: Any, **properties: Any) -> None:
-    """Set those properties of a model that differ: each one that is set is sent to the browser,
-    which draws it again.
-    """
+    """Set the properties of a model that differ: the browser draws again for each that is set."""
     for name, value in properties.items():
         if getattr(model, name) != value:
             setattr(model, name, value)
@@ -43,7 +41,7 @@ class ControlView:
 
     def __init__(self, control: Control, session: Session, change: Callable[[str, str], None]):
         self.control, self._session, self._change = control, session, change
-        # Values that the page itself sets: a change to them is not one by the user.
+        # Values that the page sets itself, to tell them from changes by the user.
         self._text, self._position = "", 0.0
         has_range = not control.choices and not control.is_text
         self._scale = control.scale(_number(session, control.key)) if has_range else None
@@ -53,33 +51,20 @@ class ControlView:
         self._field: Select | TextInput
         self._slider: Slider | None = None
         parts: list[UIElement]
+        look: dict[str, Any] = {"name": control.key, "margin": 0, "stylesheets": [FLAT]}
         if control.choices:
             options: list[Any] = [
                 (one, control.choice_labels.get(one, one))
                 for one in control.choices
                 if one != NONE or self._may_lack
             ]
-            self._field = Select(
-                options=options,
-                name=control.key,
-                width=WIDTH,
-                margin=0,
-                stylesheets=[FLAT],
-            )
+            self._field = Select(options=options, width=WIDTH, **look)
             parts = [self._field]
         elif self._scale is None:
-            self._field = TextInput(
-                name=control.key,
-                placeholder=EXAMPLE,
-                width=WIDTH,
-                margin=0,
-                stylesheets=[FLAT],
-            )
+            self._field = TextInput(placeholder=EXAMPLE, width=WIDTH, **look)
             parts = [self._field]
         else:
-            self._field = TextInput(
-                name=control.key, width=FIELD_WIDTH, margin=0, stylesheets=[FLAT]
-            )
+            self._field = TextInput(width=FIELD_WIDTH, **look)
             self._slider = Slider(
                 start=0,
                 end=STEPS,
@@ -111,7 +96,7 @@ class ControlView:
             self._change(self.control.key, text)
 
     def show(self) -> None:
-        """Show the value, whether it is changed, and its error or a note on it."""
+        """Show the value, whether it was changed, and its error or a note on it."""
         session, key = self._session, self.control.key
         is_changed = session.is_changed(key)
         before = session.start_text(key) or "not given"
@@ -123,11 +108,11 @@ class ControlView:
         value = _number(session, key)
         if self._slider is not None and self._scale is not None:
             if isinstance(value, int | float):
-                # A slider stays where the user moved it: the text is rounded, and may lag behind.
+                # A slider stays where the user moved it; the text is rounded.
                 moved = self._slider.value
                 is_there = self.control.text(self._scale.value(moved)) == self._text
                 self._position = moved if is_there else self._scale.position(float(value))
-            # Without a value, as the key no longer applies, it goes back to where it was.
+            # Without a value, as the key no longer applies, it returns to its position.
             set_changed(self._slider, value=self._position)
         problem = session.problems.get(key, "")
         message = problem or session.notes.get(key, "")

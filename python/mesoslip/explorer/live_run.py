@@ -13,29 +13,29 @@ from mesoslip.simulation.memory import check_memory, free_memory
 from mesoslip.simulation.realization import Realization
 from mesoslip.simulation.run_realizations import Results
 
-# Work of the first segment, and wall time of later ones [s]: the delay of a stop.
+# Work of the first segment, and wall time of later ones [s], after which a stop takes effect.
 FIRST_WORK = 5_000.0
 SEGMENT_SECONDS = 0.03
 # Time of the first picture [s], and the ratio of the times of later pictures.
 FIRST_PICTURE = 0.1
 PICTURE_RATIO = 2.0
-
-# Maximum wait for the previous picture to be drawn [s].
+# Maximum time to wait until the previous picture is drawn [s].
 MAX_WAIT = 1.0
 
-# Samples of a trace, and of the finer traces of slips.
+# Maximum numbers of samples of a trace, and of the finer traces of slips.
 MAX_SAMPLES = 20_000
 MAX_FINE_SAMPLES = 100_000
 # Samples of a slip, in half a period of the slider.
 SAMPLES_IN_SLIP = 100
-# Snapshots of the lattice, and their size [bytes].
+# Maximum number of snapshots of the lattice, and their maximum size [bytes].
 MAX_SNAPSHOTS = 100
 MAX_SNAPSHOT_BYTES = 50_000_000
 BYTES_PER_CONTACT = 24
 
-# Contacts of a run: each takes up to 1 us before the first segment, which nothing interrupts.
+# Maximum number of contacts: before the first segment each takes up to 1 us, which cannot be
+# interrupted.
 MAX_CONTACTS = 10_000_000
-# Part of the free memory that a run may take: there may be other pages, and other programs.
+# Part of the free memory that a run may take, beside other pages and programs.
 MAX_MEMORY_PART = 0.5
 
 
@@ -55,21 +55,14 @@ class Pace:
         self._drawn.set()
 
     def wait(self) -> None:
-        """Wait until the last picture was drawn, for a limited time: a tab in the background draws
-        none.
-        """
+        """Wait until the last picture was drawn, for a limited time, as a tab in the background
+        draws none."""
         self._drawn.wait(MAX_WAIT)
 
 
 def explored(config: Config) -> Config:
-    """A configuration as it is run for the page: one realization, samples for pictures, and
-    snapshots of a lattice. The motion is the same.
-
-    Raises
-    ------
-    ConfigError
-        If it cannot be run so.
-    """
+    """A configuration as it is run for the page: the same motion in one realization, with samples
+    for pictures, and snapshots of a lattice."""
     expected = config.expected_duration
     interval = max(config.output_interval, expected / MAX_SAMPLES)
     output: dict[str, object] = {"interval": interval, "layers": False, "snapshots": []}
@@ -85,14 +78,8 @@ def explored(config: Config) -> Config:
 
 
 def runnable(config: Config) -> Config:
-    """A configuration as it is run for the page, if the machine has the memory for it and a run
-    starts soon; see `explored`.
-
-    Raises
-    ------
-    ConfigError
-        If it cannot be run so, with each key that asks for too much.
-    """
+    """A configuration as it is run for the page, see `explored`; a `ConfigError` if a run would
+    need too much memory, or take long to start."""
     wanted = explored(config)
     count = wanted.contacts.count
     if wanted.contact_kind.is_discrete and count > MAX_CONTACTS:
@@ -105,28 +92,14 @@ def runnable(config: Config) -> Config:
 
 
 def run_live(config: Config, stop: StopRequest, show: Callable[[Results], None]) -> None:
-    """Run the first realization of a configuration, and show the results at intervals.
+    """Run the first realization of a configuration, and show the results so far: soon after the
+    start, later less often, and at the end.
 
     The first picture is shown even after a stop, so that it follows a knob that is being turned.
-
-    Parameters
-    ----------
-    config
-        Configuration of the run, see `runnable`.
-    stop
-        A request to stop after the first picture.
-    show
-        Called with the results so far, soon after the start, later less often, and at the end.
-
-    Raises
-    ------
-    RunError
-        If the run fails.
     """
-    realization = Realization(config, 0)
     start = time.perf_counter()
     due, work = FIRST_PICTURE, FIRST_WORK
-    try:
+    with Realization(config, 0) as realization:
         is_shown = False
         while not (realization.finished or (is_shown and stop.is_set())):
             before = time.perf_counter()
@@ -137,5 +110,3 @@ def run_live(config: Config, stop: StopRequest, show: Callable[[Results], None])
                 show(Results(config, [realization], realization.finished, now - start))
                 is_shown = True
                 due = PICTURE_RATIO * (time.perf_counter() - start)
-    finally:
-        realization.close()

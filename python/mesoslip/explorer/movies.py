@@ -1,4 +1,4 @@
-"""The movie of a run: what must be recorded for it, and its file."""
+"""The movie of a run, which is run again for it with more recorded."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from mesoslip.plots.close_up import largest_slip, slip_window
 from mesoslip.plots.plot import plot
 from mesoslip.simulation.run_realizations import Results
 
-# Snapshots of a movie, and the part of them in the largest slip.
+# Number of snapshots of a movie, and the fraction of them in the largest slip.
 SNAPSHOTS = 100
 IN_SLIP = 0.7
 
@@ -25,24 +25,8 @@ IN_SLIP = 0.7
 def movie_of(config: Config, stop: StopRequest, report: Callable[[str], None]) -> bytes | None:
     """A movie of a run as a GIF; None if it was stopped.
 
-    On a lattice it shows the load of each contact, of an elastic slider its layers, and else the
-    stretches of the contacts.
-
-    Parameters
-    ----------
-    config
-        Configuration of the run.
-    stop
-        A request to stop.
-    report
-        Called with what is being done.
-
-    Raises
-    ------
-    ConfigError
-        If there is no movie of such a run.
-    RunError
-        If the run fails.
+    On a lattice it shows the load of each contact, of an elastic slider its layers, and otherwise
+    the stretches of the contacts. Messages on its progress are reported.
     """
     view, wanted = recorded_for_movie(config)
     report("the movie: running …")
@@ -74,7 +58,7 @@ def recorded_for_movie(config: Config) -> tuple[str, Config]:
 
 
 def around_slip(config: Config, results: Results) -> Config:
-    """The same with snapshots, most of them in the largest slip of a run."""
+    """A configuration with snapshots, most of them in the largest slip of its run."""
     slip = largest_slip(build_tree(results))
     end = config.expected_duration
     if slip is None:

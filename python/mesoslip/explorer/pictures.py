@@ -35,23 +35,23 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-# Parts of a line; the extremes of each are drawn.
+# Parts of a line, in each of which the extremes are drawn.
 PARTS = 500
-# Minimum part of the time axis that a run under way fills.
+# Minimum part of the time axis that a running simulation fills.
 MIN_PART = 0.2
-# Points of the force curve that are drawn, its length in mean breaking stretches, its precision: a
-# picture needs no more, and a person does not wait for it.
+# Number of points of the force curve that are drawn, its length in mean breaking stretches, and its
+# precision: enough for a picture, and quick.
 CURVE_POINTS = 800
 CURVE_LENGTH = 6.0
 CURVE_TOLERANCE = 1e-6
-# Force of a measured trace, and means over its slips that are compared, with their units.
+# Force of a measured trace, and means over slips that are compared with it, with their units.
 MEASURED_FORCE = "spring_force"
 COMPARED = {"force_drop": "N", "duration": "s", "waiting_time": "s"}
-# Work that the stability of steady sliding may take.
+# Maximum work for the stability of steady sliding.
 MAX_WORK = 10_000
-# Configurations whose theory is kept.
+# Maximum number of configurations whose theory is kept.
 MAX_THEORIES = 50
-# Largest picture of the lattice, in contacts along a side.
+# Maximum size of the picture of a lattice, in contacts along a side.
 MAX_SITES = 300
 
 
@@ -74,24 +74,9 @@ NOTHING = Line(np.empty(0), np.empty(0), "", "")
 
 
 class Measured:
-    """A measured trace that is drawn beside runs.
-
-    Attributes
-    ----------
-    tree
-        The trace.
-    means
-        Statistics of its slips.
-    """
+    """A measured trace of forces that is drawn beside runs, with statistics of its slips."""
 
     def __init__(self, output: OutputLike) -> None:
-        """Read a trace.
-
-        Raises
-        ------
-        FileError
-            If it is none, or has friction coefficients instead of forces.
-        """
         self.tree = as_run(output)
         if MEASURED_FORCE not in self.tree.data_vars:
             raise FileError(
@@ -103,20 +88,9 @@ class Measured:
 
 @dataclass(frozen=True)
 class Lattice:
-    """Snapshots of a lattice.
-
-    Attributes
-    ----------
-    times
-        When they were taken [s].
-    positions
-        The same in the unit of the time axis.
-    loads
-        Force over threshold of each contact, NaN if it is detached, shape (snapshots, rows,
-        columns).
-    avalanches
-        Breaks in avalanches since the snapshot before.
-    """
+    """Snapshots of a lattice: times [s], the same in the unit of the time axis, force over
+    threshold of each contact, NaN if it is detached, shape (snapshots, rows, columns), and breaks
+    in avalanches since the snapshot before."""
 
     times: Array
     positions: Array
@@ -126,29 +100,7 @@ class Lattice:
 
 @dataclass(frozen=True)
 class Motion:
-    """A run, as far as it is done.
-
-    Attributes
-    ----------
-    force, velocity, detached
-        Against time.
-    slip_force, slip_contact_force
-        The largest slip in close-up: spring force and contact force.
-    measured
-        The force of a measured trace against time, on the axes of ``force``.
-    end
-        End of the time axis, in its unit: that of the run, or nearer if little of it is done.
-    regime
-        Which motion it is, in words.
-    numbers
-        Names and values of further results.
-    lattice
-        Snapshots, if contacts are on a lattice.
-    part_done
-        Part of the run that is done.
-    progress
-        The same in words, with the time that the rest takes.
-    """
+    """A run, as far as it is done: lines over time, those of its largest slip, and results."""
 
     force: Line
     velocity: Line
@@ -156,41 +108,35 @@ class Motion:
     slip_force: Line
     slip_contact_force: Line
     measured: Line
+    """The force of a measured trace on the axes of `force`."""
     end: float
+    """End of the time axis, in its unit: that of the run, or earlier if little of it is done."""
     regime: str
     numbers: tuple[tuple[str, str], ...]
+    """Names and values of further results."""
     lattice: Lattice | None
     part_done: float
     progress: str
+    """The part that is done in words, with the time that the rest takes."""
 
 
 @dataclass(frozen=True)
 class Theory:
-    """Predictions of theory.
-
-    Attributes
-    ----------
-    curve
-        F(X) of the master equation.
-    spring
-        The line of slope -K through the point where the slider becomes unstable.
-    critical
-        That point, X_c and its force, in the units of the curve; None if there is none.
-    summary
-        The verdict in words, or the reason why there is no curve.
-    numbers
-        Names and values of further results.
-    """
+    """The force curve of the master equation, and predictions from it."""
 
     curve: Line
     spring: Line
+    """The line of slope -K through the critical point."""
     critical: tuple[float, float] | None
+    """X_c, where the slider becomes unstable, and its force, in the units of the curve."""
     summary: str
+    """The verdict in words, or the reason why there is no curve."""
     numbers: tuple[tuple[str, str], ...]
+    """Names and values of further results."""
 
 
 def motion(results: Results, measured: Measured | None = None) -> Motion:
-    """The pictures of a run, as far as it is done, with a measured trace beside it if given."""
+    """The pictures of a run, as far as it is done, with a measured trace beside it, if any."""
     config, (realization,) = results.config, results.realizations
     tree = build_tree(results)
     extent = Extent(0, parts=PARTS)
@@ -297,7 +243,7 @@ def _line(
 
 
 def _close_up(tree: xr.DataTree) -> tuple[Line, Line]:
-    """Both forces of the largest slip; nothing if there is none."""
+    """Spring force and contact force of the largest slip, if there is a slip."""
     slip = largest_slip(tree)
     if slip is None:
         return NOTHING, NOTHING
@@ -322,7 +268,7 @@ def _close_up(tree: xr.DataTree) -> tuple[Line, Line]:
 
 
 def _largest(values: Array) -> float:
-    """Largest size of those that are finite."""
+    """Maximum absolute value of those that are finite."""
     return float(np.max(np.abs(values[np.isfinite(values)]), initial=0.0))
 
 
@@ -343,9 +289,8 @@ def _lattice(tree: xr.DataTree, along: Scale) -> Lattice | None:
 
 
 class Theories:
-    """The theory of recent configurations, so that it is not computed again when a knob returns,
-    or when theory does not depend on it.
-    """
+    """The theory of recent configurations, which is not computed again when a knob returns, or
+    when theory does not depend on it."""
 
     def __init__(self) -> None:
         self._known: OrderedDict[str, Theory] = OrderedDict()
@@ -370,11 +315,6 @@ def _depends_on(config: Config) -> str:
     return config.model_dump_json(exclude={"title": True, "run": True, "output": True})
 
 
-def theory(config: Config) -> Theory:
-    """The theory of a configuration."""
-    return with_steady_sliding(config, curve_alone(config))
-
-
 def curve_alone(config: Config) -> Theory:
     """The force curve and its instability, without steady sliding."""
     try:
@@ -387,7 +327,7 @@ def curve_alone(config: Config) -> Theory:
 
 
 def with_steady_sliding(config: Config, curve: Theory) -> Theory:
-    """The theory of a curve together with the stability of steady sliding."""
+    """The theory of a curve, with the stability of steady sliding."""
     sliding = steady_sliding(config, MAX_WORK)
     if sliding is None:
         return curve

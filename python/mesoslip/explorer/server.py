@@ -28,13 +28,13 @@ from mesoslip.explorer.pictures import Measured
 from mesoslip.explorer.view import Page
 
 ADDRESS = "127.0.0.1"
-# Ports that are tried after the one that is wanted.
+# Number of ports that are tried after a port that is in use.
 MORE_PORTS = 20
-# Delay after which the runs of a closed tab are ended [ms].
+# Time after which the runs of a closed tab are stopped [ms].
 UNUSED_MILLISECONDS = 3_000
 
-# Bokeh compiles the scripts of its widgets and styles its figures; all else is refused, and
-# everything from other hosts.
+# Bokeh compiles the scripts of its widgets and styles its figures in the page. Everything else is
+# refused, and so is everything from other hosts.
 POLICY = (
     "default-src 'self'; script-src 'self' 'unsafe-inline' 'unsafe-eval'; "
     "style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; connect-src 'self'; "
@@ -46,9 +46,9 @@ TEMPLATE = Environment(autoescape=False).from_string(
 
 
 class Pages(Handler):
-    """Builds the page of a new tab on another thread, so that other tabs are answered meanwhile.
+    """Builds the page of a new tab on another thread, while the server answers other tabs.
 
-    One at a time: several would not be done sooner, and would slow the server down.
+    One page is built at a time: several would take as long together, and slow the server down.
     """
 
     def __init__(self, config: Config, source: str, trace: Measured | None = None) -> None:
@@ -65,7 +65,7 @@ class Pages(Handler):
         await asyncio.to_thread(Page, document, self._config, self._source, self._trace)
 
     def modify_document(self, doc: Document) -> None:
-        """Nothing is left to do."""
+        """Do nothing: the page was built with its session."""
 
 
 class OnlyHere(AuthProvider):
@@ -81,7 +81,7 @@ class OnlyHere(AuthProvider):
 
     @property
     def login_url(self) -> str:
-        """There is no login: a refusal is final."""
+        """There is no login, so a refusal is final."""
         return "/"
 
     async def _user(self, handler: RequestHandler) -> str:
@@ -97,7 +97,7 @@ class OnlyHere(AuthProvider):
             raise HTTPError(403)
         handler.set_header("Content-Security-Policy", POLICY)
         handler.set_header("X-Content-Type-Options", "nosniff")
-        # A browser that caches the page for its history would keep its runs going.
+        # The runs of a page that a browser keeps for its history would continue.
         handler.set_header("Cache-Control", "no-store")
         return "here"
 
@@ -111,27 +111,10 @@ def serve(
     opens: bool,
     report: Callable[[str], None],
 ) -> None:
-    """Serve the page until the program is interrupted.
+    """Serve the page until the program is interrupted, and report its address.
 
-    Parameters
-    ----------
-    config
-        Configuration at the start.
-    source
-        Its name on the command line.
-    trace
-        A measured trace to draw beside the run.
-    port
-        Port of the loopback address; the first free one from there on.
-    opens
-        Whether a browser is opened.
-    report
-        Called with the address of the page.
-
-    Raises
-    ------
-    RunError
-        If no port is free.
+    It starts from a configuration, named by its source on the command line, at the first free port
+    from a given one, and may open a browser.
     """
     server = make_server(config, source, port, trace)
     address = f"http://{ADDRESS}:{server.port}/"
@@ -147,7 +130,7 @@ def serve(
 
 def make_server(config: Config, source: str, port: int, trace: Measured | None = None) -> Server:
     """A server of the page that is not started; see `serve`."""
-    # Objects that exist now stay: the garbage collector, which runs after each change, skips them.
+    # The garbage collector, which runs after each change, skips objects that exist now.
     gc.collect()
     gc.freeze()
 
@@ -157,7 +140,7 @@ def make_server(config: Config, source: str, port: int, trace: Measured | None =
 
     # Scripts and styles come from this server, whatever its environment says.
     settings.resources = "server"
-    # The consistency of the models is checked in tests, not for each tab.
+    # Tests check the consistency of the models; it is not checked for each tab.
     settings.perform_document_validation = False
 
     for one in [0] if port == 0 else range(port, port + MORE_PORTS):

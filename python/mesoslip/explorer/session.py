@@ -28,53 +28,29 @@ from mesoslip.explorer.stages import EXAMPLE, read_stages, write_stages
 class Session:
     """A configuration with changes to it.
 
-    Attributes
-    ----------
-    start
-        The configuration without changes.
-    source
-        Name of the configuration on the command line.
-    changes
-        Text of each key that was changed, as for ``--set``.
-    config
-        The latest configuration that can be run; all changes are in it unless there are problems.
-    problems
-        Errors of the last change, by the key of the control that shows them. A change with errors
-        is taken back, unless there was nothing yet that can be run.
-    notes
-        Further consequences of the last change, by the key of the control that shows it.
-    is_runnable
-        Whether the start with the changes can be run.
-    values
-        Values of the controls that apply to ``config``, in SI, by key.
+    A change with errors is taken back, unless there was nothing yet that can be run.
     """
 
     def __init__(self, start: Config, source: str) -> None:
-        self.start = self.config = start
+        self.start = start
+        # The latest configuration that can be run, and values of the controls that apply to it.
+        self.config = start
+        self.values = self._at_start = values(start)
         self.source = source
+        # Text of each key that was changed, as for ``--set``.
         self.changes: dict[str, str] = {}
+        # Errors and other consequences of the last change, by the key of the control that shows
+        # them.
         self.problems: dict[str, str] = {}
         self.notes: dict[str, str] = {}
         self._before: dict[str, str] = {}
         self._last = ""
-        self.values = self._at_start = values(start)
         self.is_runnable = self._check("")
 
     def change(self, key: str, text: str) -> bool:
-        """Change a key; returns whether the configuration can be run with all changes. If not, the
-        change is taken back.
+        """Change a key to a value as for ``--set``; the value at the start removes the change.
 
-        Parameters
-        ----------
-        key
-            Key of a control.
-        text
-            Its value as for ``--set``; the value at the start removes the change.
-
-        Raises
-        ------
-        KeyError
-            If there is no such control.
+        Returns whether the configuration can be run with all changes.
         """
         control = BY_KEY[key]
         self._before, self._last = dict(self.changes), key
@@ -93,18 +69,13 @@ class Session:
             self.changes = dict(self._before)
             self.notes = {}
             if key in self.problems and not control.is_text:
-                # The field shows the value as it was.
+                # The field shows the value before the change.
                 self.problems[key] = f"“{text}” refused: {self.problems[key]}"
         return is_right
 
     def take_back(self, message: str) -> bool:
-        """Take the last change back, as its run has failed; returns whether there was one.
-
-        Parameters
-        ----------
-        message
-            The error of the run.
-        """
+        """Take back the last change, as its run failed with a message; returns whether there was
+        one."""
         if self.changes == self._before:
             return False
         self.changes = dict(self._before)
@@ -114,7 +85,7 @@ class Session:
         return True
 
     def reset(self) -> bool:
-        """Remove all changes."""
+        """Remove all changes; returns whether the configuration at the start can be run."""
         self._before, self._last = {}, ""
         self.changes.clear()
         self.notes = {}
@@ -122,7 +93,7 @@ class Session:
         return self.is_runnable
 
     def _lay_over(self, control: Control, text: str) -> None:
-        """Lay a change over the others, with the keys that it requires."""
+        """Add a change to the others, with the keys that it requires."""
         key = control.key
         if control.is_text:
             self._set_stages(text)
@@ -142,7 +113,7 @@ class Session:
             self._count_lattice()
 
     def _set_stages(self, text: str) -> None:
-        """Drive in stages, or with one velocity again."""
+        """Change the drive to stages, or back to one velocity."""
         for one in ("drive.stage", "drive.velocity"):
             self.changes.pop(one, None)
         if text != self.start_text("drive.stage"):
@@ -245,7 +216,7 @@ class Session:
                     self.changes.setdefault(one, value)
 
     def _fit_lattice(self, lattice: str) -> None:
-        """Set columns and rows to those of N contacts, unless those that are there fit."""
+        """Set columns and rows to those of N contacts, unless the present ones fit."""
         sizes = [self.values.get(one) for one in LATTICE_SIZE[:2]]
         rows = sizes[1]
         if isinstance(rows, int) and not (lattice == "triangular" and rows % 2):
@@ -289,14 +260,14 @@ class Session:
         else:
             self.config = config
             self.values = values(config)
-            # Another notation of the same value, as 500 us for 0.5 ms, is no change.
+            # Another notation of the same value, such as 500 us for 0.5 ms, is no change.
             for key in list(self.changes):
                 if key in self.values and self.values[key] == self._at_start.get(key):
                     del self.changes[key]
         return not self.problems
 
     def _control_of(self, problem: Problem, last: str) -> str:
-        """The control that shows an error: its own if it is shown, else the one changed last."""
+        """The control that shows an error: that of its key if it is shown, or the last changed."""
         is_there = problem.key in self.values or problem.key in self.changes
         if problem.key == "contacts.count" and self.text("interaction.lattice") != NONE:
             # The number of contacts is that of the lattice, and has no control.

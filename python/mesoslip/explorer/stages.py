@@ -20,13 +20,7 @@ LENGTH = re.compile(r".*[\d\s.](?:[nuµm]|k|c)?m")
 
 
 def read_stages(text: str) -> str:
-    """Stages in words as the value of ``drive.stage`` on the command line.
-
-    Raises
-    ------
-    FileError
-        If a stage is none; the message has an example.
-    """
+    """Stages in words as the value of ``drive.stage`` on the command line."""
     stages = [_stage(one.strip()) for one in text.split(";") if one.strip()]
     tables = (
         ", ".join(f"{name} = {_toml(value)}" for name, value in stage.items()) for stage in stages
@@ -56,7 +50,7 @@ def _length(text: str) -> dict[str, str | bool]:
 
 
 def write_stages(stages: Sequence[Mapping[str, Any]]) -> str:
-    """Stages, in SI, in words; of forces as they are in a file."""
+    """Stages, in SI, in words."""
     return "; ".join(map(_words, stages))
 
 

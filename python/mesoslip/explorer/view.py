@@ -1,7 +1,6 @@
 """The page: knobs on the left, pictures on the right. `pictures` computes the numbers.
 
-Each piece is a root of its own, placed by `page.html`: a change draws that piece again, and not the
-whole page.
+Each piece is a root of its own, which `page.html` places: a change draws only its piece again.
 """
 
 from __future__ import annotations
@@ -35,9 +34,9 @@ from mesoslip.explorer.session import Session
 from mesoslip.output.writing import write_results
 from mesoslip.simulation.run_realizations import Results
 
-# Time that theory waits for another change after a picture was drawn [s].
+# Time between the picture of a change and the theory, in case of another change [s].
 REST = 0.15
-# Tag of the status if the run is refused; otherwise the part of the run that is drawn.
+# Tag of the status if the run is refused; otherwise the tag is the part of the run that is drawn.
 REFUSED = -1
 
 # The browser saves the content of a source under the name in its tags.
@@ -60,7 +59,7 @@ navigator.clipboard.writeText(command.value).then(() => {
 COMMAND = """
 .bk-input { height: 26px; min-height: 26px; padding: 0 6px; font-family: monospace; color: #222; }
 """
-# The page has room for the parts that are shown; the style sheet has their places.
+# The style sheet places the parts that are shown, which are the classes of the page.
 ARRANGE = "document.querySelector('main').className = cb_obj.tags.join(' ')"
 
 # Shows a message when the connection to the program is lost, and hides it afterwards.
@@ -78,8 +77,8 @@ class Page:
         self._stem = Path(source).stem or "run"
         self.session = Session(start, source)
         self._results: Results | None = None
-        # Numbers of the last change, of the last one that could be run, of that which is shown, and
-        # of that for which the theory was started.
+        # Numbers of changes: the last one, the last that could be run, the one that is shown, and
+        # the one for which theory was started.
         self._change_count = self._turn = self._shown = self._explained = 0
         self._is_closed = False
         self._workers = {
@@ -109,7 +108,7 @@ class Page:
         self._theory = TheoryView()
         self._lattice = LatticeView(document, self._motion.now)
         document.title = f"mesoslip explore: {start.title or source}"
-        # The models of a document are collected once, and not again for each piece of the page.
+        # The models of a document are collected once, not for each piece of the page.
         with document.models.freeze():
             for root in self._roots():
                 document.add_root(root)
@@ -149,7 +148,7 @@ class Page:
             made.append(button)
         copy = Button(label="copy the command", name="copy", width=150)
         copy.js_on_click(CustomJS(args={"command": self._command, "button": copy}, code=COPY))
-        # Models without a place on the page belong to its document too.
+        # These models have no place on the page, but belong to its document.
         arrangement = ColumnDataSource(name="arrangement", tags=[])
         arrangement.js_on_change("tags", CustomJS(code=ARRANGE))
         self._arrangement = arrangement
@@ -185,14 +184,8 @@ class Page:
         set_changed(self._command, value=self.session.command)
 
     def _update(self, is_back: bool = False) -> None:
-        """Show the controls as they are, and run the configuration if it can be run; otherwise the
-        run that is shown goes on.
-
-        Parameters
-        ----------
-        is_back
-            Whether the last change was taken back, because its run has failed.
-        """
+        """Show the controls, and run the configuration if it can be run; otherwise the run that is
+        shown continues. `is_back` means that the last change was taken back, as its run failed."""
         self._change_count += 1
         with self._together():
             self._show_controls()
@@ -200,7 +193,7 @@ class Page:
                 self._refuse("not run: correct the values marked in red")
                 return
             if self.session.problems and not is_back:
-                self._refuse("refused, see the message in red: the run is as it was")
+                self._refuse("refused, see the message in red: the run is unchanged")
                 return
             self._results = None
             self._turn = self._change_count
@@ -210,7 +203,7 @@ class Page:
             self._start_limit(self.session.config)
 
     def _start_limit(self, config: Config) -> None:
-        """Run the same with infinitely many contacts too, if that is wanted and possible."""
+        """Run infinitely many contacts too, if that is wanted and possible."""
         message = ""
         is_wanted = bool(self._limit.active)
         self._workers["limit"].cancel()
@@ -251,9 +244,8 @@ class Page:
         self._workers[name].submit(job)
 
     def _explain(self) -> None:
-        """Compute the theory of the run that was drawn, unless it is known. It starts after the
-        picture, which the user waits for.
-        """
+        """Compute the theory of the run that was drawn, unless it is known: after the picture, for
+        which the user waits."""
         turn, config = self._turn, self.session.config
         if self._is_closed or self._shown != turn or self._explained == turn:
             return
@@ -280,13 +272,13 @@ class Page:
         try:
             self._document.add_next_tick_callback(partial(self._show, show, turn, shown))
         except AttributeError:
-            # The document of a closed tab is destroyed before the page is closed.
+            # A tab that is closed has its document destroyed before the page is closed.
             context = self._document.session_context
             if context is not None and not context.destroyed:
                 raise
 
     def _show(self, show: Callable[[int, Any], None], turn: int, shown: object) -> None:
-        # A picture of the previous change is shown, but none older than the picture on the page.
+        # A picture of an earlier change is shown, unless it is older than that on the page.
         if not self._is_closed and turn >= self._shown:
             with self._together():
                 show(turn, shown)
@@ -318,7 +310,7 @@ class Page:
         self._results = results
         if turn == self._change_count:
             self._report(drawn.progress)
-            # Tests and measurements wait for this.
+            # Tests wait for this.
             self._status.tags = [turn, drawn.part_done]
 
     def _show_limit(self, _turn: int, shown: tuple[Motion, Results | None]) -> None:
@@ -344,7 +336,7 @@ class Page:
             self._send(path.name, path.read_bytes())
 
     def _make_movie(self) -> None:
-        """Run once more with what a movie needs, and hand it to the browser."""
+        """Run once more with what a movie needs, and send the movie to the browser."""
         if not self.session.is_runnable:
             self._report("no movie: correct the values marked in red")
             return

@@ -33,8 +33,16 @@ class Picture(NamedTuple):
     panel: Callable[[Axes], None]
 
 
-def picture(tree: xr.DataTree, view: str | None = None, options: Options = NO_OPTIONS) -> Picture:
-    """A view of an output; see `draw`."""
+def picture(
+    trees: Sequence[xr.DataTree],
+    names: Sequence[str],
+    view: str | None = None,
+    options: Options = NO_OPTIONS,
+) -> Picture:
+    """A view of an output, or of several of one command over each other; see `draw`."""
+    if len(trees) > 1:
+        return _comparison(trees, names, view, options)
+    (tree,) = trees
     chosen, options = _chosen(tree, view, options)
     return Picture(
         lambda figure: chosen.draw(tree, options, figure),
@@ -42,13 +50,9 @@ def picture(tree: xr.DataTree, view: str | None = None, options: Options = NO_OP
     )
 
 
-def comparison(
-    trees: Sequence[xr.DataTree],
-    names: Sequence[str],
-    view: str | None = None,
-    options: Options = NO_OPTIONS,
+def _comparison(
+    trees: Sequence[xr.DataTree], names: Sequence[str], view: str | None, options: Options
 ) -> Picture:
-    """A view of several outputs of one command over each other; see `draw`."""
     kind = kind_of_all(trees, names)
     chosen, options = _chosen(trees[0], view, options)
     compare_panel = chosen.compare_panel
@@ -126,10 +130,7 @@ def draw(
     Several outputs are drawn over each other; names are for those that do not differ. The name of a
     view may be a measure of a sweep.
     """
-    if len(trees) == 1:
-        chosen = picture(trees[0], view, options)
-    else:
-        chosen = comparison(trees, names, view, options)
+    chosen = picture(trees, names, view, options)
     if axes is None:
         return chosen.whole(figure)
     with styled():

@@ -21,9 +21,9 @@ from mesoslip.plots.style import Canvas, styled
 if TYPE_CHECKING:
     import xarray as xr
 
-# Intervals of a line in each of which the page shows the extremes: fewer than in print.
+# Intervals of a line in each of which the page shows the extremes, fewer than in print.
 PARTS = 1000
-# Maximum width of a picture on the page over that in print.
+# Maximum magnification of a picture on the page.
 MAX_MAGNIFICATION = 1.25
 # Resolution of the rasterized parts of pictures.
 DOTS_PER_INCH = 150
@@ -45,7 +45,7 @@ class Subject:
 
     @property
     def has_config(self) -> bool:
-        """Whether it has a whole configuration: a measured trace may have a part of one."""
+        """Whether it has a whole configuration; a measured trace may have a part of one."""
         try:
             return bool(self.config)
         except FileError:
@@ -62,7 +62,7 @@ class Text:
 
 @dataclass(frozen=True)
 class Table:
-    """A table of texts: its head, its rows, a note below it, and numbers of marked rows."""
+    """A table: its head, its rows, a note below it, and the numbers of rows that are marked."""
 
     head: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
@@ -97,23 +97,14 @@ class Section:
     blocks: tuple[Block, ...] = field(default=())
 
 
-# Writes a section about an output, or about several of one kind side by side; None if the section
-# would be empty.
+# Writes a section about outputs of one kind side by side; None if the section would be empty.
 Writer = Callable[[Sequence[Subject]], Section | None]
 
 
 def drawn(caption: str, draw: Callable[[], Canvas]) -> Picture:
-    """A figure as a picture of a page.
-
-    Parameters
-    ----------
-    caption
-        Its caption, also its text for screen readers.
-    draw
-        Draws the figure.
-    """
+    """Draw a figure for a page; its caption is its text for screen readers too."""
     stream = io.StringIO()
-    # Identifiers in the SVG derive from the caption, which is unique on a page.
+    # Identifiers in the SVG derive from the caption, which no other picture of a page has.
     with styled(), mpl.rc_context({"svg.fonttype": "none", "svg.hashsalt": caption}):
         figure = draw()
         whole = figure if isinstance(figure, Figure) else figure.figure
@@ -122,11 +113,10 @@ def drawn(caption: str, draw: Callable[[], Canvas]) -> Picture:
             one.set_rasterized(True)
         whole.savefig(stream, format="svg", dpi=DOTS_PER_INCH, metadata=NO_METADATA)
     text = stream.getvalue()
-    # Matplotlib names them after their positions, which the layout gives to rounding only.
+    # Matplotlib names clip paths after their positions, which vary by rounding.
     own = hashlib.sha256(caption.encode("utf-8", "backslashreplace")).hexdigest()[:8]
     for number, name in enumerate(re.findall(r'<clipPath id="(p[0-9a-f]+)"', text)):
         text = text.replace(name, f"clip-{own}-{number}")
-    # As wide as the page, up to a maximum magnification.
     width = MAX_MAGNIFICATION * whole.get_figwidth()
     size = re.compile(r"<svg [^>]*?(?= xmlns| viewBox)", re.DOTALL)
     text = size.sub(f'<svg style="width: 100%; max-width: {width:g}in"', text, count=1)

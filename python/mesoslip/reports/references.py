@@ -8,21 +8,13 @@ from dataclasses import dataclass
 
 # A citation in a text, as in Markdown of Pandoc: [@braun2009; @braun2011].
 CITATION = re.compile(r"\[@([^\]]+)\]")
-# Key of the program itself, whose version and year are those of an output.
+# Key of the program itself; its version and year are those of an output.
 PROGRAM = "mesoslip"
 
 
 @dataclass(frozen=True)
 class Reference:
-    """A reference.
-
-    Attributes
-    ----------
-    kind
-        Kind of entry in BibTeX.
-    fields
-        Its fields, as in BibTeX; authors are separated by " and ".
-    """
+    """A reference, with its kind and fields as in BibTeX."""
 
     kind: str
     fields: Mapping[str, str]
@@ -156,19 +148,9 @@ def program(version: str, commit: str, year: str) -> Reference:
 
 
 def numbered(text: str, keys: Sequence[str] = ()) -> tuple[str, list[str]]:
-    """A text with its citations as numbers.
+    """A text with its citations as numbers, and all keys in the order of their numbers.
 
-    Parameters
-    ----------
-    text
-        With citations such as "[@braun2009; @braun2011]".
-    keys
-        Keys that have the first numbers.
-
-    Returns
-    -------
-    tuple
-        The text, with "[1, 2]" in their places, and the keys in the order of their numbers.
+    Citations such as "[@braun2009; @braun2011]" become "[1, 2]"; `keys` have the first numbers.
     """
     found = list(keys)
 

@@ -1,20 +1,18 @@
 """The sections in the report of each kind of output, in their order.
 
-A new section is a file in this folder and a line in `SECTIONS`; a new kind of output is a line in
-`mesoslip.output.kinds.KINDS` and one here.
+Adding one is adding a file to this folder, and its function to the kinds of output that have it.
 """
 
 from __future__ import annotations
 
 from mesoslip.output.arrays import Arrays
-from mesoslip.output.kinds import kind_of
+from mesoslip.output.kinds import KINDS, kind_of
 from mesoslip.plots.views import takes_arrays as view_takes_arrays
 from mesoslip.reports.content import Writer
 from mesoslip.reports.sections.avalanches import avalanches
 from mesoslip.reports.sections.changes import changes
 from mesoslip.reports.sections.configuration import configuration
 from mesoslip.reports.sections.energy import energy
-from mesoslip.reports.sections.lyapunov import lyapunov
 from mesoslip.reports.sections.methods import methods
 from mesoslip.reports.sections.parameters import parameters
 from mesoslip.reports.sections.pictures import pictures
@@ -23,9 +21,15 @@ from mesoslip.reports.sections.regime import regime
 from mesoslip.reports.sections.response import response
 from mesoslip.reports.sections.slips import slips
 from mesoslip.reports.sections.sweep import maps, sweep
-from mesoslip.reports.sections.theory import curve, cycle, onset
+from mesoslip.reports.sections.theory import curve, cycle, lyapunov, onset
 
-SECTIONS: dict[str, tuple[Writer, ...]] = {
+
+def _with(*own: Writer) -> tuple[Writer, ...]:
+    """The sections that most kinds of output have, and others after the pictures."""
+    return (changes, pictures, *own, methods, configuration, provenance)
+
+
+SECTIONS: dict[str, tuple[Writer, ...]] = dict.fromkeys(KINDS, _with()) | {
     "run": (
         changes,
         regime,
@@ -39,19 +43,17 @@ SECTIONS: dict[str, tuple[Writer, ...]] = {
         provenance,
     ),
     "sweep": (sweep, maps, methods, provenance),
-    "cycle": (changes, pictures, cycle, methods, configuration, provenance),
-    "branches": (changes, pictures, methods, configuration, provenance),
-    "curve": (changes, pictures, curve, methods, configuration, provenance),
-    "steady": (changes, pictures, methods, configuration, provenance),
-    "onset": (changes, pictures, onset, methods, configuration, provenance),
-    "lyapunov": (changes, pictures, lyapunov, methods, configuration, provenance),
+    "cycle": _with(cycle),
+    "curve": _with(curve),
+    "onset": _with(onset),
+    "lyapunov": _with(lyapunov),
     "fit": (parameters, methods, configuration, provenance),
 }
 
 
 def takes_arrays(tree: Arrays) -> bool:
-    """Whether the sections about an output need no xarray: those of a run without avalanches, and
-    without pictures of layers or snapshots."""
+    """Whether the sections about an output need no xarray: those of a run without avalanches,
+    layers or snapshots."""
     return (
         kind_of(tree) == "run"
         and view_takes_arrays(tree, None)

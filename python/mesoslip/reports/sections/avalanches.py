@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 
 from mesoslip.analysis import avalanches as catalogue
 from mesoslip.output.access import group_of
-from mesoslip.plots import draw
 from mesoslip.quantities import column
-from mesoslip.reports.content import Block, Section, Subject, Table, Text, drawn
+from mesoslip.reports.content import Block, Section, Subject, Table, Text
+from mesoslip.reports.sections.base import picture_of_all
 
 DIGITS = 5
 
@@ -29,12 +29,7 @@ def avalanches(subjects: Sequence[Subject]) -> Section | None:
         blocks.append(Table(("quantity", "value", "meaning"), _rows(statistics)))
     full = [one for one in with_avalanches if group_of(one.tree, "avalanches").sizes["avalanche"]]
     if full:
-        trees, names = [one.tree for one in full], [one.name for one in full]
-        if len(full) == 1:
-            picture = draw.picture(trees[0], "avalanches")
-        else:
-            picture = draw.comparison(trees, names, "avalanches")
-        blocks.append(drawn("Distribution of the sizes", lambda: picture.whole(None)))
+        blocks.append(picture_of_all(full, "Distribution of the sizes", "avalanches"))
     return Section("Avalanches", tuple(blocks))
 
 

@@ -11,7 +11,7 @@ from mesoslip.reports.content import Picture, Subject, drawn
 
 
 def named(subjects: Sequence[Subject], subject: Subject, text: str) -> str:
-    """A text, with the name of its output if there are several."""
+    """A text, with the name of its output if there are several outputs."""
     return text if len(subjects) == 1 else f"{subject.name}: {text}"
 
 
@@ -23,8 +23,19 @@ def picture_of(
     options: Options = draw.NO_OPTIONS,
 ) -> Picture:
     """A view of an output."""
-    picture = draw.picture(subject.tree, view, options)
-    return drawn(named(subjects, subject, caption), lambda: picture.whole(None))
+    return picture_of_all([subject], named(subjects, subject, caption), view, options)
+
+
+def picture_of_all(
+    subjects: Sequence[Subject],
+    caption: str,
+    view: str | None = None,
+    options: Options = draw.NO_OPTIONS,
+) -> Picture:
+    """A view of outputs over each other."""
+    trees, names = [one.tree for one in subjects], [one.name for one in subjects]
+    picture = draw.picture(trees, names, view, options)
+    return drawn(caption, lambda: picture.whole(None))
 
 
 def row_in_one_unit(
@@ -38,7 +49,7 @@ def row_in_one_unit(
 def columns_in_one_unit(
     columns: Iterable[tuple[str, Sequence[float | None], str, int]],
 ) -> tuple[tuple[str, ...], tuple[tuple[str, ...], ...]]:
-    """The head and the rows of a table: each column has a name, values in SI, a unit and digits."""
+    """The head and the rows of a table, from name, values [SI], unit and digits of its columns."""
     heads, cells = [], []
     for name, values, unit, digits in columns:
         one = column(values, unit, digits)

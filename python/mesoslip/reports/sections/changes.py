@@ -42,7 +42,7 @@ def _measured(subject: Subject) -> Iterator[Block]:
 
 
 def _differences(subjects: Sequence[Subject]) -> Block:
-    """The keys that outputs do not share."""
+    """The keys in which outputs differ."""
     found = differences.differences([one.config for one in subjects])
     if not found:
         return Text("Differences: none.")

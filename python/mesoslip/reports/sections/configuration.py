@@ -18,7 +18,7 @@ FREE_NOTE = (
 
 
 def configuration(subjects: Sequence[Subject]) -> Section:
-    """All keys, with those of several outputs side by side, and those that a fit leaves free."""
+    """All keys, those of several outputs side by side; the free keys of a fit are marked."""
     configured = [one for one in subjects if one.has_config]
     blocks: list[Block] = []
     if configured:
@@ -85,7 +85,7 @@ def _lists(subject: Subject) -> dict[str, Sequence[Mapping[str, Any]]]:
 
 
 def _list(key: str, rows: Sequence[Mapping[str, Any]]) -> Table:
-    """A list of tables: a row for each, each column in one unit."""
+    """A list of tables as rows, with each column in one unit."""
     names = dict.fromkeys(name for row in rows for name in row)
     columns = [("number", tuple(str(number) for number in range(1, len(rows) + 1)))]
     columns += [

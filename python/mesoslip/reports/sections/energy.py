@@ -32,7 +32,7 @@ def energy(subjects: Sequence[Subject]) -> Section | None:
 
 
 def _balance(subject: Subject) -> Table:
-    """Energies, and their parts of the work of the drive."""
+    """Energies, and their fractions of the work of the drive."""
     data = group_of(subject.tree, "energy")
     work = abs(float(data["drive_work"].values.sum()))
     energies = {

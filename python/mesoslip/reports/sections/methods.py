@@ -2,43 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 from mesoslip.configuration import differences
-from mesoslip.configuration.config import Config
 from mesoslip.output.access import is_measured
-from mesoslip.output.kinds import kind_of
 from mesoslip.reports.content import Block, Section, Source, Subject, Text
-from mesoslip.reports.methods import (
-    branches_method,
-    curve_method,
-    cycle_method,
-    fit_method,
-    lyapunov_method,
-    measured_method,
-    onset_method,
-    run_method,
-    steady_method,
-    sweep_method,
-)
+from mesoslip.reports.method_paragraphs import computed_method, measured_method
 from mesoslip.reports.references import PROGRAM, REFERENCES, numbered, program
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-# How the method of each kind of output is described.
-METHODS: dict[str, Callable[[xr.DataTree, Config], str]] = {
-    "run": run_method,
-    "sweep": sweep_method,
-    "cycle": cycle_method,
-    "branches": branches_method,
-    "curve": curve_method,
-    "steady": steady_method,
-    "onset": onset_method,
-    "lyapunov": lyapunov_method,
-    "fit": fit_method,
-}
 
 
 def methods(subjects: Sequence[Subject]) -> Section:
@@ -66,11 +36,11 @@ def methods(subjects: Sequence[Subject]) -> Section:
 def _method(subject: Subject) -> str:
     if is_measured(subject.tree) or not subject.has_config:
         return measured_method(subject.tree)
-    return METHODS[kind_of(subject.tree)](subject.tree, subject.config)
+    return computed_method(subject.tree, subject.config)
 
 
 def _other(subject: Subject, first: Subject) -> str:
-    """The method of a further output, as differences from the first if both were computed."""
+    """The method of another output, as differences from the first if both were computed."""
     if any(is_measured(one.tree) or not one.has_config for one in (subject, first)):
         return _method(subject)
     found = differences.differences([subject.config, first.config])

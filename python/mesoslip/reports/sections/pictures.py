@@ -11,8 +11,8 @@ from mesoslip.plots.extent import Extent
 from mesoslip.plots.snapshots import is_on_lattice
 from mesoslip.plots.views import view_of
 from mesoslip.plots.views.base import Options
-from mesoslip.reports.content import PARTS, Block, Section, Subject, drawn
-from mesoslip.reports.sections.base import picture_of
+from mesoslip.reports.content import PARTS, Block, Section, Subject
+from mesoslip.reports.sections.base import picture_of, picture_of_all
 
 
 def pictures(subjects: Sequence[Subject]) -> Section:
@@ -22,9 +22,7 @@ def pictures(subjects: Sequence[Subject]) -> Section:
         options = Options(Extent(parts=PARTS))
     blocks: list[Block] = []
     if len(subjects) > 1:
-        trees, names = [one.tree for one in subjects], [one.name for one in subjects]
-        picture = draw.comparison(trees, names, options=options)
-        blocks.append(drawn("All outputs over each other", lambda: picture.whole(None)))
+        blocks.append(picture_of_all(subjects, "All outputs over each other", options=options))
     for subject in subjects:
         tree = subject.tree
         summary = view_of(tree, None, options).summary
@@ -34,11 +32,8 @@ def pictures(subjects: Sequence[Subject]) -> Section:
             caption = "Waves in the slider during its largest slip"
             blocks.append(picture_of(subjects, subject, caption, "layers", options))
         if "snapshots" in tree.children and group_of(tree, "snapshots").sizes["snapshot"]:
-            has_sites = is_on_lattice(group_of(tree, "snapshots"))
-            caption, view = (
-                ("Contacts on their lattice", "lattice")
-                if has_sites
-                else ("Stretches of the contacts and their thresholds", "contacts")
-            )
+            caption, view = "Stretches of the contacts and their thresholds", "contacts"
+            if is_on_lattice(group_of(tree, "snapshots")):
+                caption, view = "Contacts on their lattice", "lattice"
             blocks.append(picture_of(subjects, subject, caption, view))
     return Section("Pictures", tuple(blocks))

@@ -18,7 +18,7 @@ def response(subjects: Sequence[Subject]) -> Section | None:
         try:
             experiment = Experiment(subject.tree, subject.name)
         except FileError:
-            # Driven by a force, by what is unknown, or ended before its first sample.
+            # The drive is a force, or unknown, or the run ended before its first sample.
             continue
         stages = (
             {one.stage for one in subject.config.drive_parts}

@@ -16,7 +16,7 @@ from mesoslip.quantities import scale_for
 from mesoslip.reports.content import Block, Section, Subject, Table, Text, drawn
 from mesoslip.reports.sections.base import columns_in_one_unit, named, row_in_one_unit
 
-# Rows of a catalogue on a page.
+# Maximum number of rows of a catalogue on a page.
 MAX_ROWS = 60
 # Bins of a histogram.
 BINS = 24
@@ -35,12 +35,7 @@ COLUMNS = {
 }
 # Columns of which there are histograms.
 DISTRIBUTIONS = ("force_drop", "duration", "waiting_time")
-STATISTICS = {
-    "mean": "mean",
-    "standard_deviation": "standard deviation",
-    "minimum": "minimum",
-    "maximum": "maximum",
-}
+STATISTICS = ("mean", "standard_deviation", "minimum", "maximum")
 
 
 def slips(subjects: Sequence[Subject]) -> Section | None:
@@ -74,7 +69,8 @@ def _statistics(subjects: Sequence[Subject], subject: Subject, catalogue: Catalo
         for name, (header, unit) in _columns(catalogue).items()
         if name in statistics
     )
-    head = (f"{count} slip{'s' if count > 1 else ''}", *STATISTICS.values())
+    shown = (one.replace("_", " ") for one in STATISTICS)
+    head = (f"{count} slip{'s' if count > 1 else ''}", *shown)
     note = "Statistics include the first slip, which is larger if all contacts were relaxed."
     name: list[Block] = [Text(subject.name)] if len(subjects) > 1 else []
     return [*name, Table(head, rows, note)]
@@ -117,7 +113,7 @@ def _histograms(subjects: Sequence[Subject], catalogues: Sequence[Catalogue]) ->
         if together.size == 0:
             continue
         low, high = together.min(), together.max()
-        # Values that are equal up to rounding have no distribution.
+        # Values that differ by rounding have no distribution.
         if high - low <= 1e-9 * max(abs(low), abs(high)):
             low, high = low - 0.5 * abs(low), high + 0.5 * abs(high) or 1.0
         bins = np.linspace(low, high, BINS + 1)

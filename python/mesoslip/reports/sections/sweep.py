@@ -17,12 +17,10 @@ from mesoslip.reports.sections.base import named, picture_of, row_in_one_unit
 if TYPE_CHECKING:
     import xarray as xr
 
-# Measures with a picture.
+# Maximum number of measures with a picture.
 MAX_MAPS = 12
-# Values of a swept key up to which all are listed.
+# Maximum number of values of a swept key for which all are listed.
 MAX_VALUES = 10
-# Names of the codes of the status of a run.
-STATUS = ("ok", "failed", "missing")
 
 
 def sweep(subjects: Sequence[Subject]) -> Section:
@@ -30,8 +28,8 @@ def sweep(subjects: Sequence[Subject]) -> Section:
     blocks: list[Block] = []
     for subject in subjects:
         data = subject.tree.to_dataset()
-        status = data["status"].values
-        counts = {name: int(np.sum(status == code)) for code, name in enumerate(STATUS)}
+        status, names = data["status"].values, data["status"].attrs["flag_meanings"].split()
+        counts = {name: int(np.sum(status == code)) for code, name in enumerate(names)}
         states = ", ".join(f"{count} {name}" for name, count in counts.items() if count)
         text = named(subjects, subject, f"{status.size} runs: {states}.")
         blocks.append(Text(text, warns=counts["ok"] < status.size))
@@ -69,7 +67,7 @@ def _range(data: xr.DataArray) -> tuple[str, ...]:
 
 
 def _listed(key: str, values: NDArray[Any]) -> tuple[str, ...]:
-    """A swept key, the number of its values, and these: all of few, or the first and the last."""
+    """A swept key, the number of its values, and these, or the first and the last of many."""
     head, texts = differences.in_one_unit(key, values.tolist())
     listed = ", ".join(texts) if len(texts) <= MAX_VALUES else f"{texts[0]} … {texts[-1]}"
     return head, str(values.size), listed

@@ -1,11 +1,11 @@
-"""Derived numbers of force curves, onsets of slip and settled cycles.
+"""Derived numbers of force curves, onsets of slip, settled cycles and Lyapunov exponents.
 
 The theory is imported where it is used: a report of a run has none.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from mesoslip.reports.content import Section, Subject, Table, Text
@@ -35,17 +35,20 @@ def onset(subjects: Sequence[Subject]) -> Section:
     return _numbers("Onset of slip", subjects, SUMMARY)
 
 
+def lyapunov(subjects: Sequence[Subject]) -> Section:
+    """Largest Lyapunov exponents, and the range of distances that was fitted."""
+    from mesoslip.analysis.lyapunov import SUMMARY, summary
+
+    table = _table(subjects, SUMMARY, lambda tree, name: float(tree[name]), 4)
+    texts = (Text(named(subjects, one, f"{summary(one.tree)}.")) for one in subjects)
+    return Section("Largest Lyapunov exponent", (table, *texts))
+
+
 def _numbers(
     title: str, subjects: Sequence[Subject], summary: Mapping[str, tuple[str, str]]
 ) -> Section:
-    """Numbers that outputs have as attributes, side by side, with their meanings."""
-    rows = []
-    for name, (unit, meaning) in summary.items():
-        values = [one.tree.attrs.get(name) for one in subjects]
-        if any(value is not None for value in values):
-            rows.append((*_row(name, values, unit), meaning))
-    names = [one.name for one in subjects] if len(subjects) > 1 else ["value"]
-    table = Table(("quantity", *names, "meaning"), tuple(rows))
+    """Attributes of outputs that have units and meanings in a summary, and their comments."""
+    table = _table(subjects, summary, lambda tree, name: tree.attrs.get(name), DIGITS)
     comments = (
         Text(named(subjects, one, f"{one.tree.attrs['comment']}."))
         for one in subjects
@@ -54,9 +57,23 @@ def _numbers(
     return Section(title, (table, *comments))
 
 
-def _row(name: str, values: Sequence[Any], unit: str) -> tuple[str, ...]:
-    """A quantity with its unit, and its values in that unit; words as they are."""
-    numbers = [None if one is None or isinstance(one, str) else float(one) for one in values]
-    head, *texts = row_in_one_unit(name, numbers, unit, DIGITS)
-    shown = [one if isinstance(one, str) else text for one, text in zip(values, texts, strict=True)]
-    return (head, *shown)
+def _table(
+    subjects: Sequence[Subject],
+    summary: Mapping[str, tuple[str, str]],
+    value_of: Callable[[Any, str], Any],
+    digits: int,
+) -> Table:
+    """Quantities of outputs side by side, each in one unit, with their meanings; words are kept."""
+    rows = []
+    for name, (unit, meaning) in summary.items():
+        values = [value_of(one.tree, name) for one in subjects]
+        if all(value is None for value in values):
+            continue
+        numbers = [None if one is None or isinstance(one, str) else float(one) for one in values]
+        head, *texts = row_in_one_unit(name, numbers, unit, digits)
+        shown = [
+            one if isinstance(one, str) else text for one, text in zip(values, texts, strict=True)
+        ]
+        rows.append((head, *shown, meaning))
+    names = [one.name for one in subjects] if len(subjects) > 1 else ["value"]
+    return Table(("quantity", *names, "meaning"), tuple(rows))

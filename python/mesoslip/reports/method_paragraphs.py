@@ -6,7 +6,7 @@ Sentences about sliders and contacts have a form for each kind, chosen by the ty
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import singledispatch
 from typing import TYPE_CHECKING
 
@@ -21,6 +21,7 @@ from mesoslip.configuration.sliders.prescribed import PrescribedSlider
 from mesoslip.configuration.sliders.quasistatic import QuasistaticSlider
 from mesoslip.configuration.sliders.rigid import RigidSlider
 from mesoslip.errors import ConfigError, Problem
+from mesoslip.output.kinds import kind_of
 from mesoslip.quantities import column, with_unit
 
 if TYPE_CHECKING:
@@ -49,101 +50,79 @@ def quantity(value: float, unit: str) -> str:
     return with_unit(value, unit, DIGITS)
 
 
-def run_method(tree: xr.DataTree, config: Config) -> str:
-    """The method of a run."""
-    return " ".join((*_engine(config), *model(config), *_accuracy(tree, config)))
+def run_method(tree: xr.DataTree, config: Config) -> Iterator[str]:
+    yield from _engine(config)
+    yield from model(config)
+    yield from _accuracy(tree, config)
 
 
-def curve_method(_tree: xr.DataTree, config: Config) -> str:
-    """The method of a force curve."""
+def curve_method(_: xr.DataTree, config: Config) -> Iterator[str]:
     tolerance = f"{config.curve.tolerance:.0e}".replace("e-0", "e-")
-    return " ".join(
-        (
-            "The force F(X) of slow sliding was computed for infinitely many contacts of the "
-            f"{MODEL} with mesoslip [@mesoslip]: the master equation [@braun2010] is solved as a "
-            f"renewal equation, with an error of at most {tolerance} of the static force.",
-            *_contacts(config),
-        )
+    yield (
+        "The force F(X) of slow sliding was computed for infinitely many contacts of the "
+        f"{MODEL} with mesoslip [@mesoslip]: the master equation [@braun2010] is solved as a "
+        f"renewal equation, with an error of at most {tolerance} of the static force."
     )
+    yield from _contacts(config)
 
 
-def cycle_method(_tree: xr.DataTree, config: Config) -> str:
-    """The method of a settled cycle."""
-    return " ".join(
-        (
-            *_engine(config),
-            "It was iterated from one passage of the spring force through a section to the next, "
-            "until period and peaks did not change any more.",
-            *model(config),
-        )
+def cycle_method(_: xr.DataTree, config: Config) -> Iterator[str]:
+    yield from _engine(config)
+    yield (
+        "It was iterated from one passage of the spring force through a section to the next, "
+        "until period and peaks did not change any more."
     )
+    yield from model(config)
 
 
-def branches_method(tree: xr.DataTree, config: Config) -> str:
-    """The method of branches over a parameter."""
-    return " ".join(
-        (
-            *_engine(config),
-            "At each value it was iterated from one passage of the spring force through a section "
-            "to the next, from the state of the value before, up and down over "
-            f"{tree.attrs['continued_key']}.",
-            *model(config),
-        )
+def branches_method(tree: xr.DataTree, config: Config) -> Iterator[str]:
+    yield from _engine(config)
+    yield (
+        "At each value it was iterated from one passage of the spring force through a section "
+        "to the next, from the state of the value before, up and down over "
+        f"{tree.attrs['continued_key']}."
     )
+    yield from model(config)
 
 
-def lyapunov_method(tree: xr.DataTree, config: Config) -> str:
-    """The method of a Lyapunov exponent."""
-    return " ".join(
-        (
-            *_engine(config),
-            f"The largest Lyapunov exponent is the rate at which {tree.sizes['twin']} twins depart "
-            "from the run: they start a small distance away, with the same random numbers.",
-            *model(config),
-        )
+def lyapunov_method(tree: xr.DataTree, config: Config) -> Iterator[str]:
+    yield from _engine(config)
+    yield (
+        f"The largest Lyapunov exponent is the rate at which {tree.sizes['twin']} twins depart "
+        "from the run: they start a small distance away, with the same random numbers."
     )
+    yield from model(config)
 
 
-def steady_method(_tree: xr.DataTree, config: Config) -> str:
-    """The method of steady sliding over velocity."""
-    return " ".join(
-        (
-            f"The force of steady sliding of the {MODEL}, and its linear stability, were computed "
-            "with mesoslip [@mesoslip] for infinitely many contacts, from the survival of contacts "
-            "over their lives and its change under a small oscillation of the slider.",
-            *model(config),
-        )
+def steady_method(_: xr.DataTree, config: Config) -> Iterator[str]:
+    yield (
+        f"The force of steady sliding of the {MODEL}, and its linear stability, were computed "
+        "with mesoslip [@mesoslip] for infinitely many contacts, from the survival of contacts "
+        "over their lives and its change under a small oscillation of the slider."
     )
+    yield from model(config)
 
 
-def onset_method(_tree: xr.DataTree, config: Config) -> str:
-    """The method of an onset of slip."""
-    return " ".join(
-        (
-            f"The onset of slip of the {MODEL} was computed with mesoslip [@mesoslip], from the "
-            "force curve of the master equation [@braun2010], for contacts that break one after "
-            "another and for a film that melts at once.",
-            *model(config),
-        )
+def onset_method(_: xr.DataTree, config: Config) -> Iterator[str]:
+    yield (
+        f"The onset of slip of the {MODEL} was computed with mesoslip [@mesoslip], from the "
+        "force curve of the master equation [@braun2010], for contacts that break one after "
+        "another and for a film that melts at once."
     )
+    yield from model(config)
 
 
-def sweep_method(tree: xr.DataTree, config: Config) -> str:
-    """The method of a sweep."""
+def sweep_method(tree: xr.DataTree, config: Config) -> Iterator[str]:
     keys = ", ".join(str(name) for name in tree.coords if name != "realization")
     count = tree.sizes.get("realization", 1)
     each = f", with {count} realizations each" if count > 1 else ""
-    return " ".join(
-        (
-            *_engine(config),
-            *model(config),
-            f"Varied were {keys}{each}; values above of these keys are those of the base.",
-        )
-    )
+    yield from _engine(config)
+    yield from model(config)
+    yield f"Varied were {keys}{each}; values above of these keys are those of the base."
 
 
-def fit_method(tree: xr.DataTree, config: Config) -> str:
-    """The method of a fit, with the medians of its free keys."""
+def fit_method(tree: xr.DataTree, config: Config) -> Iterator[str]:
+    """Sentences on a fit, with the medians of its free keys."""
     from mesoslip.inference import posterior
 
     rows = posterior.table(tree)
@@ -156,17 +135,34 @@ def fit_method(tree: xr.DataTree, config: Config) -> str:
         config = config.replace(values)
     except ConfigError:
         note = f"Values above of {', '.join(values)} are not those of the fit."
-    return " ".join(
-        (
-            f"Parameters of the {MODEL} were estimated with mesoslip [@mesoslip] from a measured "
-            f"force (median, interval of 90 %): {estimates}. The trace and "
-            f"{tree.attrs['simulation_count']} simulations of it, with its sampling and noise, are "
-            "reduced to the same summaries, and parameters are drawn from a synthetic likelihood "
-            "of these [@wood2010] by an affine-invariant ensemble sampler [@foreman2013].",
-            *model(config),
-            note,
-        )
+    yield (
+        f"Parameters of the {MODEL} were estimated with mesoslip [@mesoslip] from a measured "
+        f"force (median, interval of 90 %): {estimates}. The trace and "
+        f"{tree.attrs['simulation_count']} simulations of it, with its sampling and noise, are "
+        "reduced to the same summaries, and parameters are drawn from a synthetic likelihood "
+        "of these [@wood2010] by an affine-invariant ensemble sampler [@foreman2013]."
     )
+    yield from model(config)
+    yield note
+
+
+# Sentences on the method of each kind of output.
+METHODS: dict[str, Callable[[xr.DataTree, Config], Iterator[str]]] = {
+    "run": run_method,
+    "sweep": sweep_method,
+    "cycle": cycle_method,
+    "branches": branches_method,
+    "curve": curve_method,
+    "steady": steady_method,
+    "onset": onset_method,
+    "lyapunov": lyapunov_method,
+    "fit": fit_method,
+}
+
+
+def computed_method(tree: xr.DataTree, config: Config) -> str:
+    """The method of an output that was computed."""
+    return " ".join(METHODS[kind_of(tree)](tree, config))
 
 
 def _estimate(row: Row) -> str:
@@ -371,7 +367,7 @@ def _motion(drive: Drive) -> str:
 
 
 def _accuracy(tree: xr.DataTree, config: Config) -> Iterator[str]:
-    """How the motion is computed, and how exactly."""
+    """Sentences on the integration of the slider, and on its error."""
     method = config.slider.solver_name(config)
     if method in {"adams", "bdf"}:
         yield "The slider is integrated by CVODE of SUNDIALS [@hindmarsh2005]."

@@ -183,7 +183,7 @@ class Config(Table):
 
     @property
     def bond_stiffness(self) -> float:
-        """Stiffness of the bond between neighbours, G = 3 xi f_s/a [N/m]; 0 without interaction."""
+        """Stiffness of the bond between neighbours, G = 3 ξ f_s/a [N/m]; 0 without interaction."""
         return 0.0 if self.interaction is None else self.interaction.bond_stiffness(self.contacts)
 
     @property
@@ -218,7 +218,7 @@ class Config(Table):
 
     @property
     def unreached_drive(self) -> str | None:
-        """A message if the run ends before a finite drive; otherwise None."""
+        """A message if the run ends before the end of a finite drive; otherwise None."""
         length = self.drive.length
         # The sum of the stages has rounding errors.
         if not self.duration < (1 - 1e-9) * length < math.inf:

@@ -11,7 +11,8 @@ from .campaign.sweep import sweep
 from .configuration.config import Config
 from .configuration.threshold_law import ThresholdLaw
 from .cycles.branch import branches
-from .cycles.cycle import Cycle, cycle
+from .cycles.cycle import cycle
+from .cycles.cycle_result import Cycle
 from .errors import ConfigError, FileError, MesoslipError, RunError
 from .examples import example
 from .execution.executors import Dask, Processes, Threads

@@ -15,7 +15,7 @@ ARRAY_PACKAGES = ("dask", "pint", "cupy", "sparse")
 def hidden() -> Iterator[None]:
     """Hide the packages that are not imported yet, as if they were not installed."""
     absent = [name for name in ARRAY_PACKAGES if name not in sys.modules]
-    # None there makes an import fail.
+    # An entry of None makes an import fail.
     sys.modules.update(dict.fromkeys(absent))  # type: ignore[arg-type]
     try:
         yield

@@ -160,7 +160,7 @@ def test_smooth_sliding_and_irregular_motion_are_told_apart():
     assert irregular.motion == "irregular"
     assert irregular.spread > 0.02
     assert sum(irregular.durations) < irregular.followed
-    assert "followed for" in irregular.verdict
+    assert "stays irregular for" in irregular.verdict
     assert irregular.is_stable is None
 
 
@@ -258,10 +258,10 @@ def test_motion_goes_on_at_another_temperature():
         )
         for one in (0.01, 0.1)
     )
-    words, before = Motion(cold).go_on(None, 20e-3)
+    words, before = Motion(cold).advance(None, 20e-3)
     changed = adapted(words, cold, warm)
     assert elastic_force(changed) == pytest.approx(elastic_force(words), rel=1e-9)
-    after = Motion(warm).go_on(changed, 40e-3)[1]
+    after = Motion(warm).advance(changed, 40e-3)[1]
     forces = [contact_theory(one).steady_force(3e-6) for one in (cold, warm)]
     assert forces[1] < 0.95 * forces[0]
     found = [float(np.mean(one["contact_force"][len(one) // 2 :])) for one in (before, after)]
@@ -270,10 +270,10 @@ def test_motion_goes_on_at_another_temperature():
 
 def test_motion_goes_on_though_all_contacts_are_detached():
     fast = configuration("drive.velocity=20 um/s", "slider.stiffness=30 kN/m", "run.resolution=1")
-    words, trace = Motion(fast).go_on(None, 4e-3)
+    words, trace = Motion(fast).advance(None, 4e-3)
     assert trace["detached_contacts"][-1] == pytest.approx(fast.contacts.count)
     slow = fast.replace({"drive.velocity": 3e-6})
-    after = Motion(slow).go_on(adapted(words, fast, slow, modulation=0.02), 4e-3)[1]
+    after = Motion(slow).advance(adapted(words, fast, slow, modulation=0.02), 4e-3)[1]
     assert after["detached_contacts"].min() < 0.9 * slow.contacts.count
     assert np.isfinite(after["contact_force"]).all()
 
@@ -398,7 +398,7 @@ def test_slow_decay_at_the_rate_of_linear_theory():
     motion = Motion(config)
     words, sizes, window = None, [], 0.1
     for _ in range(6):
-        words, trace = motion.go_on(words, window)
+        words, trace = motion.advance(words, window)
         sizes.append(np.std(trace["spring_force"]))
     assert math.log(sizes[-1] / sizes[-2]) / window == pytest.approx(growth, rel=0.03)
     found = mesoslip.cycle(config)

@@ -38,10 +38,10 @@ def configuration(stiffness: float) -> Config:
 
 def starts() -> list[Words]:
     motion = Motion(configuration(SOFT))
-    words, _ = motion.go_on(None, 30.0)
+    words, _ = motion.advance(None, 30.0)
     found = []
     for _ in range(COUNT):
-        words, _ = motion.go_on(words, BETWEEN)
+        words, _ = motion.advance(words, BETWEEN)
         found.append(words)
     return found
 
@@ -50,7 +50,7 @@ def lifetime(words: Words, config: Config) -> tuple[float, bool]:
     """Time until a motion has ended [s], or for which it was followed; and whether it has."""
     motion, time = Motion(config), 0.0
     while time < LONGEST:
-        words, trace = motion.go_on(words, WINDOW)
+        words, trace = motion.advance(words, WINDOW)
         force = trace["spring_force"]
         fall = float(np.max(np.maximum.accumulate(force) - force))
         if fall < MIN_FALL * config.contacts.static_force:

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from mesoslip.configuration.config import Config
-    from mesoslip.cycles.cycle import Cycle
+    from mesoslip.cycles.cycle_result import Cycle
 
 StartOption = Annotated[
     str | None,
@@ -176,7 +176,7 @@ def _print_branches(data: xr.Dataset, key: str) -> None:
 
 
 def _print(found: Cycle) -> None:
-    from mesoslip.cycles.cycle import SUMMARY
+    from mesoslip.cycles.cycle_result import SUMMARY
 
     summary = found.summary()
     show_motion = found.motion

@@ -1,1 +1,1 @@
-"""The configuration of a run: what may stand in it, and whether it can be run."""
+"""The configuration of a run: its keys, and checks of their values."""

@@ -51,7 +51,7 @@ class Cells:
 def cells_of(text: str, source: str) -> Cells:
     """A table as text: columns separated by comma, semicolon, tab or spaces.
 
-    Lines that are empty or start with ``#`` are skipped; a table without lines is a `FileError`.
+    Lines that are empty or start with ``#`` are skipped; there must be others.
     """
     lines = [
         (number, line.strip(" \r"))
@@ -96,8 +96,8 @@ def find_columns(
 ) -> dict[str, FoundColumn]:
     """The columns of known quantities, by the name of the quantity; others are not read.
 
-    Keys of ``known`` are names of headers in lower case, with underscores for spaces. A `FileError`
-    if a column occurs twice, or has no unit or a wrong one.
+    Keys of ``known`` are names of headers in lower case, with underscores for spaces. A column that
+    occurs twice, or has no unit or a wrong one, is refused.
     """
     places: dict[str, FoundColumn] = {}
     for column, header in enumerate(headers):
@@ -127,8 +127,8 @@ def values_of(
 ) -> dict[str, list[float]]:
     """Values in SI of the columns in ``places``, see `find_columns`.
 
-    A `FileError` if a row has more cells than there are headers, a cell is missing, or it is not
-    one unambiguous finite number.
+    A row with more cells than there are headers is refused, and a cell that is missing or not one
+    unambiguous finite number.
     """
     values: dict[str, list[float]] = {name: [] for name in places}
     decimal = "." if cells.delimiter == "," else _decimal_of(cells, places.values())

@@ -234,7 +234,7 @@ class Config(Table):
 
     @property
     def unreached_drive(self) -> str | None:
-        """A message if the run ends before a finite drive; otherwise None."""
+        """A message if the run ends before the end of a finite drive; otherwise None."""
         length = self.drive.length
         # The sum of the stages has rounding errors.
         if not self.duration < (1 - 1e-9) * length < math.inf:

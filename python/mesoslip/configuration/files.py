@@ -114,7 +114,7 @@ def _are_the_same(path: Path, other: Path) -> bool:
 
 
 def parse_toml(text: str, source: str) -> dict[str, Any]:
-    """Tables of a text in TOML; a `ConfigError` if it is not valid or nested too deeply."""
+    """Tables of a text in TOML, which must be valid and not too deeply nested."""
     try:
         return tomllib.loads(text)
     except RecursionError:

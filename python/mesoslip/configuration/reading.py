@@ -16,7 +16,7 @@ MAX_BYTES = 2**26
 
 
 def as_path(path: PathLike) -> Path:
-    """The path of a file; a `FileError` for other objects."""
+    """The path of a file; raises a `FileError` for other objects."""
     if not isinstance(path, str | os.PathLike):
         raise FileError(f"{shown(path)}: is not the path of a file")
     return Path(path)

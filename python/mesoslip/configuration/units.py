@@ -59,7 +59,7 @@ SI = {
     "K": Unit(Decimal(1), (0, 0, 0, 1)),
 }
 NONE = Unit(Decimal(1), (0, 0, 0, 0))
-# Their bases, as pint names them.
+# Bases of the dimensions, by pint's names.
 DIMENSIONS = ("[length]", "[mass]", "[time]", "[temperature]")
 
 
@@ -90,8 +90,11 @@ def _with_comma(text: str, decimal: str) -> str:
 
 
 def to_si(value: object, unit: str, example: str) -> float:
-    """A quantity as a plain number in an SI unit such as "N/m", from a number in that unit, or a
-    string with one number and one unit; a `ValueError` names an example of a right value."""
+    """A quantity as a plain number in an SI unit such as "N/m".
+
+    It is a number in that unit, or a string with one number and one unit. The `ValueError` for
+    other values has the example of a right one.
+    """
     wanted = f"expected a quantity such as {example!r}, or a number in {unit}"
     if isinstance(value, bool) or not isinstance(value, Real | str):
         raise ValueError(wanted)

@@ -1,37 +1,41 @@
-"""Branches of a motion over a parameter: each value starts from the state of the one before.
+"""Branches of motions over a parameter: each value starts from the state of the value before.
 
 Values go up and down again. Where cycles and smooth sliding are both possible, the two directions
-differ: hysteresis. Where an oscillation ends between two values, the end is found by bisection.
+differ (hysteresis). The end of an oscillation between two values is found by bisection.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from mesoslip.configuration.config import Config
 from mesoslip.configuration.keys import key_kind
 from mesoslip.cycles.coordinates import SLIDER, Coordinates
-from mesoslip.cycles.cycle import MAX_WORK, Cycle, master_equation, settled_cycle
+from mesoslip.cycles.cycle import MAX_WORK, master_equation, settled_cycle
+from mesoslip.cycles.cycle_result import Cycle
 from mesoslip.cycles.section import Level, Motion
 from mesoslip.cycles.settling import TOLERANCE
 from mesoslip.errors import ConfigError, Problem
+from mesoslip.output import variables
 from mesoslip.output.inputs import ConfigLike, as_config
+from mesoslip.output.provenance import program_attributes
 from mesoslip.simulation.archive import Archive
 from mesoslip.simulation.kernel import Words
-from mesoslip.simulation.start import put_on_spring
+from mesoslip.simulation.start import drive_displacement, put_on_spring
 from mesoslip.theory.steady_sliding import steady_sliding
 
 if TYPE_CHECKING:
     import xarray as xr
 
-# Keys in which a motion can go on from a state of another value.
+    from mesoslip.theory.linear_stability import LinearStability
+
+# Keys for which a motion can continue from a state at another value.
 CONTINUED = (
     "drive.velocity",
     "slider.mass",
@@ -45,30 +49,21 @@ CONTINUED = (
     "contacts.ageing.*",
     "contacts.thermal.*",
 )
-# Maximum number of passages at one value, fewer than without a state close by.
+# Maximum number of passages at one value, fewer than without a state near the settled one.
 MAX_CYCLES = 32
-# Part by which the contacts over their stretch are modulated where smooth sliding is unstable, so
-# that its growth starts from more than rounding.
+# Relative modulation of the contacts over their stretch where smooth sliding is unstable, so that
+# growth does not start from rounding errors.
 MODULATION = 0.02
-# Relative distance of the values between which an oscillation ends.
+# Relative distance of the two values around the end of an oscillation.
 END_TOLERANCE = 0.01
 
+MOTIONS = variables.MOTIONS.split()
+DIRECTIONS = ("up", "down")
 
-@dataclass(frozen=True)
-class End:
-    """Where an oscillation ends in smooth sliding as it is followed over a parameter.
 
-    Attributes
-    ----------
-    direction
-        0 if the values go up, 1 if they go down.
-    value, beyond
-        The last value with the oscillation, and the first one without.
-    motion
-        "periodic" or "irregular", at the last value.
-    amplitude_ratio
-        Amplitude there over the static force F_s.
-    """
+class End(NamedTuple):
+    """The end of an oscillation in smooth sliding, as the parameter goes up (0) or down (1): the
+    last value with the oscillation, the first one without, motion and amplitude at the last one."""
 
     direction: int
     value: float
@@ -87,12 +82,12 @@ def branches(
     find_multipliers: bool = False,
     progress: Callable[[float], None] | None = None,
 ) -> xr.Dataset:
-    """Follow the settled motion over a parameter, up and down again.
+    """Compute the settled motion over a parameter, up and down again.
 
     Parameters
     ----------
     config
-        As `mesoslip.cycle` takes it; its initial state is that of the first value.
+        As for `mesoslip.cycle`; its initial state is that of the first value.
     key
         Dotted key, one of `CONTINUED`.
     values
@@ -100,15 +95,15 @@ def branches(
     tolerance, max_cycles, find_multipliers
         As for `mesoslip.cycle`, at each value.
     progress
-        Called with the part that is done, 0 to 1.
+        Called with the completed part, 0 to 1.
 
     Returns
     -------
     xarray.Dataset
-        Of dimensions ``direction`` ("up", "down") and the key: amplitude, period, peaks, kind of
-        motion, multipliers; over the key alone: steady force and growth rate of smooth sliding.
-        Of dimension ``end``, if an oscillation ends in smooth sliding: the values around that
-        within 1 %, the direction, and the amplitude just before.
+        With dimensions ``direction`` ("up", "down") and the key: amplitude, period, peaks, motion,
+        multipliers. With the dimension of the key: steady force and growth rate of smooth sliding.
+        With dimension ``end``, if an oscillation ends in smooth sliding: the values around the end
+        (within 1 %), the direction, and the motion and its amplitude before the end.
 
     Raises
     ------
@@ -117,12 +112,11 @@ def branches(
     RunError
         If a run fails.
     """
-    from mesoslip.cycles.branch_dataset import dataset_of
-
     base = master_equation(as_config(config))
     _check(key, values)
     configs = [base.replace({key: float(value)}) for value in values]
     found: list[list[Cycle]] = []
+    ends: list[End] = []
     last: Cycle | None = None
     done = 0
     for order in (1, -1):
@@ -134,15 +128,12 @@ def branches(
             if progress is not None:
                 progress(done / (2 * len(configs)))
         found.append(branch[::order])
-    ends = []
-    for direction, order in enumerate((1, -1)):
-        along = list(zip(values[::order], found[direction][::order], strict=True))
-        for (value, before), (beyond, after) in pairwise(along):
+        for (value, before), (beyond, after) in pairwise(zip(values[::order], branch, strict=True)):
             if before.exists and not after.exists:
                 end = _end_between(base, key, value, beyond, before, tolerance, max_cycles)
-                ends.append(End(direction, *end))
+                ends.append(end)
     sliding = [steady_sliding(one, MAX_WORK) for one in configs]
-    return dataset_of(base, key, values, found, sliding, ends)
+    return _dataset(base, key, values, found, sliding, ends)
 
 
 def _end_between(
@@ -153,8 +144,8 @@ def _end_between(
     last: Cycle,
     tolerance: float,
     max_cycles: int,
-) -> tuple[float, float, str, float]:
-    """Last value with an oscillation, first one without, the motion and its amplitude over F_s."""
+) -> End:
+    """The end of an oscillation between two values, by bisection."""
     while abs(beyond - value) > END_TOLERANCE * max(abs(beyond), abs(value)):
         middle = (value + beyond) / 2
         config = base.replace({key: middle})
@@ -163,7 +154,7 @@ def _end_between(
             value, last = middle, found
         else:
             beyond = middle
-    return value, beyond, last.motion, last.amplitude_ratio
+    return End(int(beyond < value), value, beyond, last.motion, last.amplitude_ratio)
 
 
 def _check(key: str, values: Sequence[float]) -> None:
@@ -182,7 +173,7 @@ def _next(
     *,
     find_multipliers: bool,
 ) -> Cycle:
-    """The settled motion of the next value, from that of the last one."""
+    """The settled motion at the next value, from that at the last one."""
     words: Words | None = None
     level: Level | None = None
     if last is not None:
@@ -203,29 +194,18 @@ def _next(
 
 
 def adapted(words: Words, before: Config, config: Config, *, modulation: float = 0.0) -> Words:
-    """A state of another configuration as one of this: velocities and forces, but that of the
-    damper, stay as they are.
+    """A state of a rigid slider on populations, adapted to a configuration with other values of the
+    keys in `CONTINUED`; velocities and forces, except the damper's, stay the same.
 
-    Parameters
-    ----------
-    words
-        State of a rigid slider on populations.
-    before, config
-        The configuration it is of, and the one it is to be of, of which keys of `CONTINUED` may be
-        others.
-    modulation
-        Part by which the density of contacts over their stretch is modulated.
+    The density of contacts over their stretch may be modulated by a small part.
     """
     motion = Motion(config)
     archive = Archive(words)
     put_on_spring(archive, SLIDER, before, config)
     time = archive.number(SLIDER, "time")
-    drive = archive.number(SLIDER, "drive value") + archive.number(SLIDER, "drive rate") * (
-        time - archive.number(SLIDER, "drive time")
-    )
     for name, value in (
+        ("drive value", drive_displacement(archive, SLIDER)),
         ("drive time", time),
-        ("drive value", drive),
         ("drive rate", motion.velocity),
         ("impulse", 0.0),
     ):
@@ -236,3 +216,65 @@ def adapted(words: Words, before: Config, config: Config, *, modulation: float =
     coordinates = Coordinates(config, motion.velocity)
     state = archive.words()
     return coordinates.changed(state, coordinates.modulation(state, modulation))
+
+
+def _dataset(
+    base: Config,
+    key: str,
+    values: Sequence[float],
+    found: Sequence[Sequence[Cycle]],
+    sliding: Sequence[LinearStability | None],
+    ends: Sequence[End],
+) -> xr.Dataset:
+    """The branches as a dataset; ``found`` has shape (directions, values), and steady sliding is
+    None without a theory."""
+    import xarray as xr
+
+    kind = key_kind(key)
+    units = (None if kind is None else kind.cf_units) or "1"
+    columns: dict[str, Callable[[Cycle], float]] = {
+        "amplitude": lambda one: one.amplitude,
+        "amplitude_ratio": lambda one: one.amplitude_ratio,
+        "spread": lambda one: one.spread,
+        "period": lambda one: one.period,
+        "peak_force": lambda one: one.peak_force,
+        "low_force": lambda one: one.low_force,
+        "multiplier": lambda one: abs(one.multipliers[0]) if one.multipliers else math.nan,
+        "motion": lambda one: MOTIONS.index(one.motion),
+        "multiple": lambda one: one.multiple,
+    }
+    data = {
+        name: _variable(name, ("direction", key), [[value(one) for one in row] for row in found])
+        for name, value in columns.items()
+    }
+    forces = [math.nan if one is None else one.force for one in sliding]
+    data["steady_force"] = _variable("steady_force", (key,), forces)
+    rates = [math.nan if one is None else one.growth_rate for one in sliding]
+    data["growth_rate"] = _variable("growth_rate", (key,), rates)
+    if ends:
+        end_columns: dict[str, list[float]] = {
+            "end_value": [one.value for one in ends],
+            "end_beyond": [one.beyond for one in ends],
+            "end_amplitude_ratio": [one.amplitude_ratio for one in ends],
+            "end_direction": [one.direction for one in ends],
+            "end_motion": [MOTIONS.index(one.motion) for one in ends],
+        }
+        data |= {name: _variable(name, ("end",), column) for name, column in end_columns.items()}
+        for name in ("end_value", "end_beyond"):
+            data[name].attrs["units"] = units
+    coordinates = {
+        key: xr.Variable((key,), np.array(values, dtype=float), {"units": units}),
+        "direction": ("direction", list(DIRECTIONS)),
+    }
+    attributes = program_attributes(base, "branches") | {"continued_key": key}
+    return xr.Dataset(data, coordinates, attributes)
+
+
+def _variable(name: str, dimensions: tuple[str, ...], values: Any) -> xr.Variable:
+    """A variable of `BRANCHES`, with values of its flags."""
+    meaning = variables.BRANCHES[name]
+    found = variables.BRANCHES.variable(name, dimensions, np.array(values, dtype=meaning.dtype))
+    if "flag_meanings" in meaning.further:
+        count = len(meaning.further["flag_meanings"].split())
+        found.attrs["flag_values"] = np.arange(count, dtype=np.int8)
+    return found

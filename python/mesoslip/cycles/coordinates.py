@@ -1,9 +1,9 @@
-"""A state of the master equation at a section, as a vector; and small changes of the state by it.
+"""States of the master equation at a section as vectors, and small changes of states by vectors.
 
-The vector has the velocity and the damper of the slider, the number of pinned contacts over their
-stretch, and that of detached ones over the time since they broke, both as hat functions. A change
-multiplies the populations by a smooth function of these. What is finer than the hat functions
-stays; it decays within one life of a contact, as thresholds blur it.
+A vector has the velocity and the damper of the slider, and two densities as hat functions: of
+pinned contacts over their stretch, and of detached ones over the time since they broke. A change
+multiplies populations by a smooth function. It does not affect structure finer than the hat
+functions, which decays within one life of a contact, as thresholds blur it.
 """
 
 from __future__ import annotations
@@ -17,21 +17,22 @@ from scipy.linalg import solveh_banded
 from mesoslip.cycles.section import mass_of
 from mesoslip.simulation.archive import Archive
 from mesoslip.simulation.kernel import Array, Words
+from mesoslip.simulation.start import drive_displacement
 
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
 
 # Distance of hat functions over the spread of the breaking stretches, and their maximum number.
 CELL_PART, MAX_CELLS = 0.5, 2000
-# Widest spread that matters for the distance.
+# Maximum spread in this ratio.
 MAX_SPREAD = 0.35
-# Range of stretches in mean breaking stretches; spreads beyond the mean.
+# Range of stretches in mean breaking stretches, extended by a number of spreads.
 MIN_STRETCH, MAX_STRETCH, SPREADS = -0.3, 1.2, 4.0
-# Hat functions of the time since breaking.
+# Number of hat functions of the time since breaking.
 DELAY_CELLS = 8
-# Contacts of a cell over all below which it is not changed.
+# Part of all contacts below which a cell is not changed.
 EMPTY = 1e-10
-# Range of the factor by which a population may change.
+# Range of the factor of a population in a change.
 MIN_FACTOR, MAX_FACTOR = 0.05, 5.0
 
 # Columns of a population, rows of its moments and of a packet: fortran/contacts/populations.
@@ -53,7 +54,7 @@ class Hats:
         return cell, place - cell
 
     def sums(self, points: Array, amounts: Array) -> Array:
-        """Sums of amounts at points, times each hat function."""
+        """Sums of the amounts at points, weighted with each hat function."""
         cell, part = self._place(points)
         total = np.zeros(self.count)
         np.add.at(total, cell, amounts * (1 - part))
@@ -61,7 +62,7 @@ class Hats:
         return total
 
     def factors(self, points: Array, amounts: Array, change: Array) -> Array:
-        """Factors of the amounts, smooth over the points, that change their sums by so much."""
+        """Factors of the amounts, smooth over the points, that change their sums by ``change``."""
         if not amounts.size:
             return np.empty(0)
         cell, part = self._place(points)
@@ -78,10 +79,7 @@ class Hats:
 
 
 class Coordinates:
-    """States of a rigid slider on populations as vectors.
-
-    Forces are in units of F_s, numbers in units of N.
-    """
+    """States of a rigid slider on populations as vectors; forces over F_s, numbers over N."""
 
     def __init__(self, config: Config, velocity: float) -> None:
         contacts = config.contacts
@@ -114,17 +112,17 @@ class Coordinates:
         )
 
     def weigh(self, vector: Array) -> Array:
-        """A vector whose length measures a change: densities as distributions, so that a peak that
-        shifts changes by how far."""
+        """A vector whose length measures a change; densities are integrated, so that the shift of a
+        peak counts with its distance."""
         slider, pinned, detached = np.split(vector, [2, 2 + self._pinned.count])
         step = self._pinned.step
         return np.concatenate([slider, step**1.5 * np.cumsum(pinned), step * detached])
 
     def modulation(self, words: Words, part: float) -> Array:
-        """The change that modulates the density of pinned contacts over their stretch by a part."""
+        """The change that modulates the density of pinned contacts over their stretch."""
         pinned = np.split(self.of(words), [2, 2 + self._pinned.count])[1]
         wave = part * np.sin(2 * np.pi * np.arange(pinned.size) / pinned.size) * pinned
-        # All contacts may be detached.
+        # The sum over the contacts stays the same; all of them may be detached.
         wave -= pinned * (np.sum(wave) / max(float(np.sum(pinned)), EMPTY))
         return np.concatenate([np.zeros(2), wave, np.zeros(self._detached.count)])
 
@@ -140,7 +138,7 @@ class Coordinates:
         return stretches
 
     def _packets(self, archive: Archive) -> tuple[Array, Array, slice]:
-        """Time since breaking over the delay, numbers, and where they are in the archive."""
+        """Time since breaking over the delay, numbers of contacts, and columns in the archive."""
         packets = archive.matrix(DETACHED, "packet")
         first, last = (int(archive.number(DETACHED, name)) for name in ("first", "last"))
         there = slice(first - 1, last)
@@ -153,7 +151,7 @@ class Coordinates:
         return (archive.number(SLIDER, "time") - middle) / delay, numbers, there
 
     def changed(self, words: Words, change: Array) -> Words:
-        """A state that is changed by a vector, which is small."""
+        """A state changed by a small vector."""
         archive = Archive(words)
         rows, left = self._rows(archive)
         since, numbers, there = self._packets(archive)
@@ -200,13 +198,11 @@ class Coordinates:
         )
 
     def _set_slider(self, archive: Archive, velocity: float, damper: float) -> None:
-        """Change velocity and damper of the slider, and let its acceleration follow."""
+        """Change velocity and damper of the slider, and its acceleration accordingly."""
         velocity += archive.number(SLIDER, "velocity")
         damper += archive.number(SLIDER, "damper")
-        here, time = (archive.number(SLIDER, name) for name in ("displacement", "time"))
-        drive = archive.number(SLIDER, "drive value") + archive.number(SLIDER, "drive rate") * (
-            time - archive.number(SLIDER, "drive time")
-        )
+        here = archive.number(SLIDER, "displacement")
+        drive = drive_displacement(archive, SLIDER)
         stiffness, offset = (archive.number(PINNED, name) for name in ("stiffness", "offset"))
         drag = self._config.contacts.contact_drag * archive.number(DETACHED, "mass")
         force = stiffness * here - offset + drag * velocity

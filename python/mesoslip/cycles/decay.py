@@ -1,8 +1,8 @@
-"""Does an oscillation of the master equation decay, or keep its amplitude?
+"""Whether an oscillation of the master equation decays or keeps its amplitude.
 
-An oscillation may take hundreds of its periods to decay. Next to smooth sliding it does so at the
-rate of the leading root of linear theory; elsewhere only a longer time shows it. So passages come
-in batches, with pauses between them that double from one to the next.
+A decay may take hundreds of periods. Near smooth sliding its rate is that of the leading root of
+linear theory; otherwise only longer times show it. So passages are computed in batches, with pauses
+that double from one batch to the next.
 """
 
 from __future__ import annotations
@@ -16,25 +16,25 @@ if TYPE_CHECKING:
     from mesoslip.cycles.section import Passage
     from mesoslip.simulation.kernel import Array
 
-# First pause, in times of loading; maximum number of batches; relative difference and standard
-# errors of equal means; number of batches compared if smooth sliding is linearly unstable, and if
-# it may be stable.
+# First pause over the time of loading, and maximum number of batches.
 BATCH_LOADINGS, MAX_BATCHES = 5.0, 7
+# Maximum relative difference of equal means, in addition to a number of standard errors.
 EQUAL_MEANS, STANDARD_ERRORS = 0.03, 3.0
+# Number of batches compared if smooth sliding is linearly unstable, and otherwise.
 MIN_BATCHES_UNSTABLE, MIN_BATCHES_STABLE = 2, 3
-# A decay by linear theory: minimum and maximum number of passages; maximum deviation of the
-# velocity from the drive's, over it, so that the slider does not stop; maximum relative deviations
-# of period and rate from those of the leading root; that of the rate over the frequency, which the
-# steps of the solver change; and minimum part of the variation of the logarithm of the amplitude
-# that the decay explains.
+# Number of passages in which a decay by linear theory is sought.
 MIN_LINEAR, MAX_LINEAR = 6, 24
+# Maximum deviation of the velocity from the drive's, over it, so that the slider does not stop;
+# maximum relative deviations of period and rate from those of the leading root.
 MAX_SWING, PERIOD_MARGIN, RATE_MARGIN = 0.6, 0.05, 0.25
+# Maximum deviation of the rate due to steps of the solver, over the frequency; minimum part of the
+# variation of the logarithm of the amplitude that the decay explains.
 STEP_MARGIN, MIN_EXPLAINED = 1e-4, 0.95
 
 
 class Batch(NamedTuple):
-    """Time [s], mean amplitude and its standard error [N] of the later half of a batch, and whether
-    its oscillation is that of linear theory."""
+    """Time [s], mean amplitude and its standard error [N] in the later half of a batch, and whether
+    the oscillation is that of linear theory."""
 
     time: float
     mean: float
@@ -43,14 +43,10 @@ class Batch(NamedTuple):
 
 
 class Amplitudes:
-    """Amplitudes of the passages so far.
+    """Amplitudes of the passages so far, compared with linear theory.
 
-    Parameters
-    ----------
-    velocity
-        Velocity of the drive [m/s].
-    is_stable, root
-        Whether smooth sliding is linearly stable, and the leading root [1/s]; None if not known.
+    The velocity is the drive's [m/s]; stability and leading root [1/s] of smooth sliding may be
+    unknown.
     """
 
     def __init__(self, velocity: float, is_stable: bool | None, root: complex | None) -> None:
@@ -62,7 +58,7 @@ class Amplitudes:
         self._first = 0
 
     def restart(self) -> None:
-        """The section or the state is another one: earlier passages are of another series."""
+        """Begin another series of passages, as the section or the state has been replaced."""
         self._first = len(self._rows)
 
     def take(self, passage: Passage) -> None:
@@ -75,10 +71,10 @@ class Amplitudes:
         self._rows.append((passage.time, passage.peak - passage.low, is_linear))
 
     def decay_linearly(self) -> bool:
-        """Whether the last passages decay as linear theory has it, and the slider does not stop.
+        """Whether the last passages decay as in linear theory, and the slider does not stop.
 
-        The rate then differs from the root's by a term of the square of the amplitude, which is
-        smaller than the margin. So it stays negative while the amplitude falls: no cycle is below.
+        The rate then differs from the root's by a term of the square of the amplitude, less than
+        the margin. So it stays negative as the amplitude falls: there is no smaller cycle.
         """
         times, sizes, is_linear = self._columns(self._rows[self._first :][-MAX_LINEAR:])
         count = len(times) if np.all(is_linear) else int(np.argmin(is_linear[::-1]))
@@ -91,7 +87,7 @@ class Amplitudes:
         return is_exponential and self._is_rate(float(slope))
 
     def end_batch(self) -> None:
-        """Take the passages since the last batch as one."""
+        """Make a batch of the passages since the last one."""
         times, sizes, is_linear = self._columns(self._rows[len(self._rows) // 2 :])
         error = float(np.std(sizes)) / math.sqrt(len(sizes))
         self._batches.append(
@@ -100,7 +96,7 @@ class Amplitudes:
         self._rows, self._first = [], 0
 
     def fall_between_batches(self) -> bool:
-        """Whether the amplitude falls from batch to batch as linear theory has it."""
+        """Whether the amplitude falls from the last batch to this one as in linear theory."""
         if len(self._batches) < 2 or not all(one.is_linear for one in self._batches[-2:]):
             return False
         early, late = self._batches[-2:]
@@ -109,7 +105,7 @@ class Amplitudes:
         return -fall > STANDARD_ERRORS * error and self._is_rate(fall / (late.time - early.time))
 
     def stay(self) -> bool:
-        """Whether the mean amplitude is that of the batches before, or there were many of them."""
+        """Whether the mean amplitude stays the same, or there are no further batches."""
         if len(self._batches) == MAX_BATCHES:
             return True
         last, *before = self._batches[: -self._needed - 1 : -1]

@@ -1,6 +1,6 @@
-"""The master equation as a map: from one passage of the spring force through a level to the next.
+"""The master equation as a map from one passage of the spring force through a level to the next.
 
-The section is where the rising force passes a level high in its cycle. There most contacts are
+The section is where the rising force passes a high level of its cycle, when most contacts are
 pinned and the slider sticks. The run is cut exactly there, so that the map is smooth.
 """
 
@@ -21,22 +21,22 @@ from mesoslip.simulation.recorded_tables import SLIP_COLUMNS, TRACE_COLUMNS, str
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
 
-# Samples of the trace in a period of the pinned slider's ringing.
+# Number of samples in a period of the pinned slider's ringing.
 SAMPLES_OF_RINGING = 32
-# Advances between two looks at the trace.
+# Number of advances after which the trace is searched for a passage.
 CHUNK = 256
-# The level, and the one below which the force must fall before it, in parts of the range.
+# Level of the section, and level below which the force must have been, relative to its range.
 LEVEL, RESET = 0.8, 0.5
-# Parts of the range between which a level may lie before it is chosen again.
+# Range of the level in which it is not chosen again.
 MIN_LEVEL, MAX_LEVEL = 0.65, 0.93
-# Time in which the next passage is sought, in times of loading to the static force and periods of
-# the setup.
+# Maximum time to the next passage, in times of loading to the static force plus periods of the
+# setup.
 MAX_LOADINGS, MAX_PERIODS = 8.0, 30.0
 # No bound on the work of a chunk.
 ANY_WORK = 1e18
-# Tables that a slider with a constant drive fills.
+# Tables with rows under a constant drive.
 USED_TABLES = ("trace", "slips", "slip_trace", "stages")
-# Steps of Newton's method for the time of a passage.
+# Number of steps of Newton's method for the time of a passage.
 NEWTON_STEPS = 6
 
 TIME, DRIVE, DISPLACEMENT, VELOCITY, FORCE = (
@@ -49,7 +49,7 @@ Trace = NDArray[np.void]
 
 @dataclass(frozen=True)
 class Level:
-    """A level of the spring force [N], and the one below which it must have been [N]."""
+    """A level of the spring force [N], and a level below which it must have been before [N]."""
 
     force: float
     reset: float
@@ -61,26 +61,15 @@ class Level:
         return cls(low + LEVEL * (high - low), low + RESET * (high - low))
 
     def fits(self, force: Array) -> bool:
-        """Whether the level is still high in the range of a force, and not at its top."""
+        """Whether the level is in the upper part of the range of a force, but not at the top."""
         low, high = float(np.min(force)), float(np.max(force))
         return MIN_LEVEL <= (self.force - low) / max(high - low, 1e-300) <= MAX_LEVEL
 
 
 @dataclass(frozen=True)
 class Passage:
-    """From one passage through the section to the next.
-
-    Attributes
-    ----------
-    words
-        State at the end.
-    start_time, time
-        When it starts and ends [s].
-    trace
-        Samples in between, with the columns of a trace.
-    slips
-        Slips that ended in between, with the columns of the catalogue.
-    """
+    """The motion between two passages through the section: state at the end, start and end [s],
+    samples, and slips that ended in between."""
 
     words: Words
     start_time: float
@@ -120,13 +109,7 @@ def extreme(values: Array) -> float:
 
 
 class Motion:
-    """Runs of the master equation under a constant drive, cut at will.
-
-    Parameters
-    ----------
-    config
-        The configuration, of engine "me" and with a constant velocity of the drive.
-    """
+    """Segments of runs of the master equation under a constant velocity of the drive."""
 
     def __init__(self, config: Config) -> None:
         self.config = config
@@ -138,7 +121,7 @@ class Motion:
         force = contacts.static_force
         self.loading_time = force * (1 / spring + 2 / contacts.stiffness) / abs(self.velocity)
         self.setup_period = 2 * math.pi * math.sqrt(mass / spring)
-        # Its contacts, which take longer to make than to copy.
+        # Its contacts are copied, which is faster than making them again.
         self._template = Kernel()
         kind = config.contact_kind
         self._template.set_contacts(
@@ -146,7 +129,7 @@ class Motion:
         )
 
     def open(self, words: Words | None, end_time: float = NEVER) -> Kernel:
-        """A kernel at a state, or at the start; the drive ends at a time [s]."""
+        """A kernel at a state, or at the start, with a drive that ends at a time [s]."""
         kernel = configured_kernel(
             self.config, self._template, end_time=end_time, interval=self.interval
         )
@@ -156,7 +139,7 @@ class Motion:
             kernel.restore(words)
         return kernel
 
-    def go_on(self, words: Words | None, duration: float) -> tuple[Words, Trace]:
+    def advance(self, words: Words | None, duration: float) -> tuple[Words, Trace]:
         """The state after a time [s], and the trace until then."""
         start = 0.0 if words is None else time_of(words)
         kernel = self.open(words, start + duration)
@@ -167,25 +150,25 @@ class Motion:
         return self._saved(kernel), structured(np.concatenate(rows), TRACE_COLUMNS)
 
     def _saved(self, kernel: Kernel) -> Words:
-        """The state of a kernel that can go on, though its drive has ended."""
+        """The state of a kernel, without the ending of its drive, so that it can be continued."""
         archive = Archive(kernel.save())
         archive.set_number("simulation", "ending", 0)
         kernel.close()
         return archive.words()
 
     def next_passage(self, words: Words, level: Level) -> Passage | None:
-        """Go on from a state to the next passage through a level; None if there is none in a long
-        time."""
+        """Advance from a state to the next passage through a level; None if the maximum time is
+        reached."""
         start = time_of(words)
         kernel = self.open(words)
         pieces: list[_Piece] = []
         limit = start + MAX_LOADINGS * self.loading_time + MAX_PERIODS * self.setup_period
-        watch = _Watch(level)
+        search = _PassageSearch(level)
         now = start
         while now < limit:
             kernel.advance(CHUNK, ANY_WORK)
             pieces.append(_Piece(words, now, *_taken(kernel)))
-            found = watch.crossing(pieces[-1].trace)
+            found = search.passage_time(pieces[-1].trace)
             if found is not None:
                 kernel.close()
                 while pieces[-1].time >= found:
@@ -196,7 +179,7 @@ class Motion:
         return None
 
     def _cut(self, start: float, time: float, pieces: list[_Piece]) -> Passage:
-        """Repeat the last piece of a passage up to a time [s]."""
+        """The motion up to a passage at a time [s], for which the last piece is repeated."""
         last = pieces.pop()
         kernel = self.open(last.words, time)
         while not kernel.ask().ending:
@@ -212,13 +195,13 @@ class Motion:
 
 
 def _taken(kernel: Kernel) -> tuple[Array, Array]:
-    """The trace and the slips that wait in a kernel, which waits for all its tables to be taken."""
+    """Drain all tables of a kernel; returns the trace and the slips."""
     taken = {table: kernel.drain(table) for table in USED_TABLES}
     return taken["trace"], taken["slips"]
 
 
 class _Piece(NamedTuple):
-    """Some advances: the state at their start and when that is, samples and slips."""
+    """A chunk of a motion: the state and the time [s] at its start, samples and slips."""
 
     words: Words
     time: float
@@ -226,16 +209,16 @@ class _Piece(NamedTuple):
     slips: Array
 
 
-class _Watch:
-    """Looks for the passage of the force in its samples."""
+class _PassageSearch:
+    """Search for the passage of the force in successive samples."""
 
     def __init__(self, level: Level) -> None:
         self._level = level
         self._was_low = False
         self._last: Array = np.empty((0, len(TRACE_COLUMNS)))
 
-    def crossing(self, rows: Array) -> float | None:
-        """Time of the passage [s] in further samples; None if there is none."""
+    def passage_time(self, rows: Array) -> float | None:
+        """Time of the passage [s] in further samples; None if they have no passage."""
         rows = np.concatenate([self._last, rows])
         self._last = rows[-1:]
         force = rows[:, FORCE]
@@ -279,7 +262,7 @@ class _Watch:
 
 
 def mass_of(config: Config) -> float:
-    """Mass of the slider [kg], which has one."""
+    """Mass of a rigid slider [kg]."""
     assert config.slider.oscillator is not None
     return config.slider.oscillator.mass
 

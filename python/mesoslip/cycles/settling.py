@@ -1,15 +1,15 @@
-"""A motion of the master equation is brought to its settled cycle.
+"""Iteration of a motion of the master equation to its settled cycle.
 
-The map from section to section is iterated. Where it converges, it usually does so within some ten
-cycles: contacts forget within a few lives. Where the last changes shrink by one slow factor, the
-limit of their geometric series is taken as the next state.
+The map from section to section is iterated. Where it converges, it usually does so within about ten
+cycles, as contacts forget their history within a few lives. Where the last changes shrink by one
+slow factor, the next state is the limit of their geometric series.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,76 +20,56 @@ from mesoslip.cycles.section import Level, Motion, Passage, Trace, time_of
 from mesoslip.errors import RunError
 from mesoslip.simulation.kernel import Array, Words
 
-# Maximum number of sections that a settled cycle passes.
+# Maximum number of passages in a settled cycle.
 MAX_MULTIPLE = 4
 # Relative error of period and peaks at which a cycle is settled, and maximum number of cycles.
 TOLERANCE, MAX_CYCLES = 1e-5, 80
-# Relative spread of period and peaks over the last cycles below which a motion is periodic all the
-# same, and number of these passages: steps of the solver, or a fine structure, may keep it from
-# settling any further.
+# Relative spread of period and peaks over a number of last passages below which a motion that has
+# not settled is periodic: steps of the solver, or a fine structure, may keep it from settling.
 MAX_SPREAD, SPREAD_PASSAGES = 2e-3, 24
-# Part of the first batch of passages in each later one.
+# Passages in a later batch over those in the first one.
 BATCH_PART = 0.5
 # Ratio of successive changes below which they shrink.
 SHRINKING = 0.98
-# Ratio of spreads that are equal, and of changes: the shorter cycle is taken. Those of a cycle of
-# several passages are far below those from one passage to the next.
+# Ratios up to which spreads and changes of cycles of different lengths count as equal; the shorter
+# cycle is then chosen. A true cycle of several passages has much smaller ones than a shorter cycle.
 EQUAL_SPREAD, EQUAL_CHANGE = 3.0, 10.0
 # Amplitude over F_s below which sliding is smooth.
 MIN_AMPLITUDE = 1e-3
-# Time before the first section, in times of loading and in periods of the setup.
+# Time before the first section, in times of loading plus periods of the setup.
 LOADINGS, PERIODS = 2.0, 10.0
-# Times the run goes on before sections are sought again, where there are none.
+# Maximum number of such times without an oscillation.
 MAX_WINDOWS = 40
-# Factor by which changes must go on shrinking to be extrapolated, its variation, cycles between,
-# and maximum of the extrapolated changes of period, peak and low over period and amplitude.
+# Changes are extrapolated if they shrink by a slow factor with little variation, some cycles after
+# the last extrapolation, and by a limited jump of period, peak and low (over period and amplitude).
 SLOW, MAX_VARIATION, MIN_BETWEEN, MAX_JUMP = 0.6, 0.15, 4, 0.3
-# Ratio of successive amplitudes, and part of the amplitude left in the end, of a decay to rest.
+# Final amplitude over the present one below which an oscillation decays to smooth sliding.
 DECAYED = 0.1
 
 
 @dataclass
 class Settled:
-    """How a motion came to its settled state.
-
-    Attributes
-    ----------
-    motion
-        "periodic", "smooth", or "irregular": not settled.
-    multiple
-        Sections that a settled cycle passes, 1 to 4.
-    passages
-        The last passages, the latest last; those of one settled cycle, if it is periodic.
-    level
-        The section.
-    words
-        State at the end.
-    followed
-        Time for which the motion was followed [s].
-    cycles
-        Passages that were computed.
-    extrapolations
-        How often the state was extrapolated.
-    error
-        Estimated relative error of period and peaks.
-    changes
-        Differences of the vectors of the last states, after a cycle of ``multiple`` passages.
-    rows
-        Duration [s], maximum and minimum of the spring force [N] of all passages of this section,
-        shape (passages, 3).
-    """
+    """The settled state of a motion: "periodic", "smooth", or "irregular" if it did not settle."""
 
     motion: str
     multiple: int
+    """Number of passages in a settled cycle."""
     passages: list[Passage]
+    """The last passages in their order; those of one cycle, if it is periodic."""
     level: Level | None
     words: Words
     followed: float
+    """Simulated time [s]."""
     cycles: int
-    extrapolations: int = 0
-    error: float = math.nan
-    changes: list[Array] = field(default_factory=list)
-    rows: Array = field(default_factory=lambda: np.empty((0, 3)))
+    """Number of computed passages."""
+    extrapolations: int
+    error: float
+    """Estimated relative error of period and peaks."""
+    changes: list[Array]
+    """Differences of the vectors of the last states, over a cycle of ``multiple`` passages."""
+    rows: Array
+    """Duration [s], maximum and minimum of the spring force [N] of all passages of this section,
+    shape (passages, 3)."""
 
 
 def settle(
@@ -103,34 +83,22 @@ def settle(
     max_cycles: int = MAX_CYCLES,
     progress: Callable[[float], None] | None = None,
 ) -> Settled:
-    """Bring a motion to its settled state.
+    """Iterate a motion to its settled state, from a state with a section that may fit, or from the
+    start of a run.
 
-    Parameters
-    ----------
-    motion
-        The motion.
-    words, level
-        State to start from, and a section that may fit; the start of a run by default.
-    is_stable
-        Whether smooth sliding is linearly stable, if that is known.
-    root
-        The root of linear theory that decays most slowly or grows fastest [1/s], if it is known.
-    tolerance
-        Relative error of period and peaks.
-    max_cycles
-        Number of passages before a motion that does not settle is compared with itself later.
-    progress
-        Called after each passage with the part of the maximum that is done.
+    Stability of smooth sliding and leading root [1/s] may be unknown. The tolerance is the relative
+    error of period and peaks. After ``max_cycles`` passages a motion that has not settled is
+    compared with itself later. ``progress`` is called with the passages over that number.
     """
     run = _Settling(motion, is_stable, root, tolerance, 0.0 if words is None else time_of(words))
     if words is None or level is None:
-        words, trace = motion.go_on(words, run.window)
+        words, trace = motion.advance(words, run.window)
         level = run.level_of(trace)
     for _ in range(MAX_WINDOWS):
         if level is None:
             if is_stable:
                 return run.result("smooth", words)
-            words, trace = motion.go_on(words, run.window)
+            words, trace = motion.advance(words, run.window)
             level = run.level_of(trace)
             continue
         words, level, verdict = run.iterate(words, level, max_cycles, progress)
@@ -140,7 +108,7 @@ def settle(
 
 
 class _Settling:
-    """Passages so far."""
+    """The passages so far of a motion that is iterated."""
 
     def __init__(
         self,
@@ -162,14 +130,14 @@ class _Settling:
         self._restart()
 
     def _restart(self) -> None:
-        """Forget earlier passages: the section or the state is another one."""
+        """Forget earlier passages, as the section or the state has been replaced."""
         self._rows: list[Array] = []
         self._amplitudes.restart()
         self._vectors: list[Array] = []
         self._recent: list[Passage] = []
 
     def level_of(self, trace: Trace) -> Level | None:
-        """The section for the later half of a trace; None if it hardly oscillates."""
+        """The section for the later half of a trace; None without an oscillation."""
         force = trace["spring_force"][len(trace) // 2 :]
         if float(np.ptp(force)) < MIN_AMPLITUDE * self._force:
             return None
@@ -182,7 +150,8 @@ class _Settling:
         max_cycles: int,
         progress: Callable[[float], None] | None,
     ) -> tuple[Words, Level | None, str]:
-        """Iterate with one section: state, next section, and what the motion is if it is known."""
+        """Iterate with one section; returns the state, the next section, and the motion, empty if
+        it is not known."""
         self._restart()
         self._level = level
         self._limit = self._limit or max_cycles
@@ -192,7 +161,7 @@ class _Settling:
             if progress is not None:
                 progress(min(1.0, self._count / max_cycles))
             if passage is None:
-                words, trace = self._motion.go_on(words, self.window)
+                words, trace = self._motion.advance(words, self.window)
                 return words, self.level_of(trace), ""
             words = passage.words
             self._take(passage)
@@ -205,8 +174,9 @@ class _Settling:
                 return words, Level.of(force), ""
             multiple, error = self._multiple()
             if error < self._tolerance and len(self._rows) > 2 * multiple:
-                if not self._fits(multiple):
-                    return words, self._new_level(multiple), ""
+                force = self._force_of(multiple)
+                if not level.fits(force):
+                    return words, Level.of(force), ""
                 return words, level, "periodic"
             words = self._extrapolated(words, multiple)
         self._amplitudes.end_batch()
@@ -216,11 +186,11 @@ class _Settling:
             return words, level, "periodic" if self._spread()[1] < MAX_SPREAD else "irregular"
         self._limit = self._count + max(SPREAD_PASSAGES, int(BATCH_PART * max_cycles))
         pause = self._amplitudes.pause(self._motion.loading_time)
-        words, trace = self._motion.go_on(words, pause)
+        words, trace = self._motion.advance(words, pause)
         return words, self.level_of(trace), ""
 
     def _spread(self) -> tuple[int, float]:
-        """Passages of a cycle, and the relative spread of the last ones, the least of all."""
+        """Number of passages in a cycle with the smallest relative spread, and that spread."""
         last = np.array(self._rows[-SPREAD_PASSAGES:])
         found = [(1, math.inf)]
         if len(last) == SPREAD_PASSAGES:
@@ -240,14 +210,6 @@ class _Settling:
         self._amplitudes.take(passage)
         self._vectors.append(self._coordinates.of(passage.words))
 
-    def _fits(self, multiple: int) -> bool:
-        """Whether the section is high in the range of the cycle."""
-        assert self._level is not None
-        return self._level.fits(self._force_of(multiple))
-
-    def _new_level(self, multiple: int) -> Level:
-        return Level.of(self._force_of(multiple))
-
     def _force_of(self, multiple: int) -> Array:
         force: Array = np.concatenate(
             [one.trace["spring_force"] for one in self._recent[-multiple:]]
@@ -255,7 +217,7 @@ class _Settling:
         return force
 
     def _differences(self, multiple: int) -> Array:
-        """Relative changes over a cycle of some passages, of period, peak and low; shape (n, 3)."""
+        """Relative changes of period, peak and low over cycles of some passages, shape (n, 3)."""
         rows = np.array(self._rows)
         changes: Array = rows[multiple:] - rows[:-multiple]
         amplitude = max(float(rows[-1, 1] - rows[-1, 2]), 1e-9 * self._force)
@@ -263,9 +225,9 @@ class _Settling:
         return changes
 
     def _multiple(self) -> tuple[int, float]:
-        """Passages of a cycle, and the estimated error of its period and peaks.
+        """Number of passages in a cycle, and the estimated relative error of its period and peaks.
 
-        A cycle of several passages is one whose passages stay different.
+        The passages of a cycle of several stay different from each other.
         """
         found: list[tuple[float, int]] = []
         is_shrinking, first = False, math.inf
@@ -287,7 +249,7 @@ class _Settling:
         return multiple, error
 
     def _decays(self) -> bool:
-        """Whether the amplitude goes to zero, by its geometric series, where that is possible."""
+        """Whether the amplitude decays to zero, by linear theory or its geometric series."""
         rows = np.array(self._rows)
         if len(rows) < 6 or self._is_stable is False:
             return False
@@ -301,11 +263,11 @@ class _Settling:
         if not (np.all(ratios < 1) and np.ptp(ratios) < 0.02 * (1 - np.mean(ratios))):
             return False
         factor = falls[1:] / falls[:-1]
-        left = sizes[-1] + falls[-1] * float(np.mean(factor)) / (1 - float(np.mean(factor)))
-        return bool(np.all(factor < 1) and left < DECAYED * sizes[-1])
+        limit = sizes[-1] + falls[-1] * float(np.mean(factor)) / (1 - float(np.mean(factor)))
+        return bool(np.all(factor < 1) and limit < DECAYED * sizes[-1])
 
     def _extrapolated(self, words: Words, multiple: int) -> Words:
-        """The limit of a geometric series of changes, where they are one; else the state."""
+        """The limit of the changes if they are a geometric series; otherwise the state itself."""
         vectors = self._vectors
         if len(vectors) < 3 * multiple + MIN_BETWEEN:
             return words
@@ -332,7 +294,7 @@ class _Settling:
         elif error > self._tolerance:
             multiple, error = self._spread()
         elif multiple > 1:
-            # What is as small as the fine structure is none of the cycle.
+            # Changes as small as the fine structure do not count as changes of the cycle.
             change = float(np.max(np.abs(self._differences(1)[-multiple:])))
             if change < MAX_SPREAD:
                 multiple, error = 1, change
@@ -357,17 +319,8 @@ class _Settling:
 
 
 def variation_after(motion: Motion, settled: Settled, part: float, cycles: int) -> float:
-    """Maximum relative change of period and peaks in cycles after a change of the state.
-
-    Parameters
-    ----------
-    motion, settled
-        The motion and its settled cycle.
-    part
-        Part by which the density of pinned contacts over their stretch is modulated at first.
-    cycles
-        Number of cycles, of which the second half counts.
-    """
+    """Maximum relative change of period and peaks in the second half of the cycles after a
+    modulation of the density of pinned contacts over their stretch."""
     assert settled.level is not None
     coordinates = Coordinates(motion.config, motion.velocity)
     words = coordinates.changed(settled.words, coordinates.modulation(settled.words, part))
@@ -392,23 +345,11 @@ def _period_and_peak(passages: Sequence[Passage]) -> tuple[float, float]:
 def multipliers(
     motion: Motion, settled: Settled, *, max_steps: int, size: float, tolerance: float
 ) -> tuple[Sequence[complex], int]:
-    """Leading multipliers of a settled cycle, from Arnoldi's method on differences of the map.
+    """Leading multipliers of a settled cycle by modulus, and the number of computed cycles, by
+    Arnoldi's method on differences of the map.
 
-    Parameters
-    ----------
-    motion, settled
-        The motion and its settled cycle.
-    max_steps
-        Maximum number of steps, each of which computes a cycle.
-    size
-        Maximum change of a number of the vector.
-    tolerance
-        Change of the leading multiplier in a step below which it is found.
-
-    Returns
-    -------
-    multipliers, steps
-        The leading ones, by modulus; and cycles that were computed.
+    A step computes a cycle with a change of the state, at most ``size`` in each number of the
+    vector; the tolerance is the change of the leading modulus in the last step.
     """
     coordinates = Coordinates(motion.config, motion.velocity)
     if not settled.changes or settled.level is None:
@@ -419,12 +360,12 @@ def multipliers(
             assert settled.level is not None
             passage = motion.next_passage(words, settled.level)
             if passage is None:
-                raise RunError("a cycle next to the settled one does not come back to its section")
+                raise RunError("a cycle near the settled one does not return to its section")
             words = passage.words
         return coordinates.of(words)
 
     start, end = coordinates.of(settled.words), image(settled.words)
-    # The latest changes that are not rounding errors have the leading modes.
+    # The latest changes above rounding errors have the leading modes.
     weigh = coordinates.weigh
     sizes = [float(np.max(np.abs(one))) for one in settled.changes]
     chosen = next(
@@ -438,7 +379,7 @@ def multipliers(
         part = size / float(np.max(np.abs(basis[-1])))
         changed = coordinates.changed(settled.words, part * basis[-1])
         applied = (coordinates.of(changed) - start) / part
-        # Parts that could not be applied, in empty cells, are left out of the basis too.
+        # The basis is the applied change, which is 0 in empty cells.
         scale = float(np.linalg.norm(weigh(applied)))
         basis[-1] = applied / scale
         column = (image(changed) - end) / part / scale

@@ -37,7 +37,7 @@ _LOG = logging.getLogger("mesoslip")
 @contextmanager
 def connected(address: str) -> Iterator[Client]:
     """A client of a scheduler at an address such as "tcp://host:8786", or in a ``.json`` file that
-    the scheduler wrote (``--scheduler-file``); a `FileError` if there is none."""
+    the scheduler wrote (``--scheduler-file``); raises a `FileError` without one."""
     try:
         from distributed import Client
         from distributed.comm.addressing import parse_address, parse_host_port

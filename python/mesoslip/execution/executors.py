@@ -142,7 +142,7 @@ def completed(
     pickled unless the executor shares memory. Pieces are taken from the iterable as workers need
     them. ``poll`` is called about ten times a second. If the iteration ends early, the generator
     must be closed, which waits at most ``max_wait`` [s] for pieces on threads; None is no limit.
-    A `PoolError` if there are no workers and none can be started.
+    Raises a `PoolError` if there are no workers and none can be started.
     """
     inner = Stop(stop)
     waiting = iter(pieces)
@@ -195,7 +195,7 @@ def _first_done(running: Iterable[Future[Any]]) -> Iterator[Future[Any]]:
 
 
 def _checked(future: Future[Result], pool: Pool) -> Future[Result]:
-    """A completed future; a `PoolError` if it failed because its pool has ended."""
+    """A completed future; raises a `PoolError` if it failed because its pool has ended."""
     if future.cancelled():
         pool.check()
         raise PoolError(GONE)

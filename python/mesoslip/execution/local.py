@@ -69,7 +69,7 @@ class WorkerProcess:
     def compute(self, function: Function[Any, Any], piece: object) -> tuple[bool, Any]:
         """Compute a piece in the process: whether that succeeded, and the result or the error.
 
-        If the process has died, an `OSError` or `EOFError`.
+        Raises an `OSError` or `EOFError` if the process has died.
         """
         self._connection.send((compute_elsewhere, (function, piece, program())))
         answer: tuple[bool, Any] = self._connection.recv()
@@ -185,7 +185,7 @@ class LocalPool(Pool):
     ) -> tuple[WorkerProcess, bool, Any]:
         """Compute a piece in a process, which is replaced if it dies.
 
-        Returns the process, whether the piece succeeded, and its result or error. A
+        Returns the process, whether the piece succeeded, and its result or error. Raises a
         `WorkerLostError` if all attempts failed, a `PoolError` if processes die with every piece.
         """
         for _ in range(MAX_ATTEMPTS):

@@ -100,8 +100,10 @@ class Folder:
         )
 
     def lock(self) -> None:
-        """Make the folder and lock it for this process; a `FileError` if another one writes to it,
-        an `OSError` if it cannot be made."""
+        """Make the folder and lock it for this process.
+
+        Raises a `FileError` if another process writes to it, an `OSError` if it cannot be made.
+        """
         if self._lock is not None:
             return
         while True:
@@ -249,8 +251,8 @@ MANIFEST = "manifest.json"
 class Store(Pieces):
     """Finished pieces, such as "points", in a folder that this process alone writes to.
 
-    All pieces belong to one fingerprint, which is empty if their names contain it. A `FileError` if
-    the folder cannot be locked, or its pieces have another fingerprint.
+    All pieces belong to one fingerprint, which is empty if their names contain it. Raises a
+    `FileError` if the folder cannot be locked, or its pieces have another fingerprint.
     """
 
     def __init__(self, path: Path, kind: str, fingerprint: str = "") -> None:

@@ -18,8 +18,8 @@ def is_measured(tree: Tree) -> bool:
 
 
 def config_of(tree: Tree, name: str = "the output") -> Config:
-    """The configuration of an output; a `FileError` if it is not that of a run, as of a measured
-    trace that was read without one."""
+    """The configuration of a run; raises a `FileError` for a measured trace that was read without
+    a configuration."""
     try:
         return Config.from_toml(tree.attrs["configuration"])
     except ConfigError:

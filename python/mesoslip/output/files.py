@@ -44,7 +44,7 @@ DAMAGES = (
 def opened(path: str | Path) -> Iterator[xr.DataTree]:
     """An output of any command; data are read when needed.
 
-    A `FileError` if it is not an output, is damaged, or refers to other files.
+    Raises a `FileError` if it is not an output, is damaged, or refers to other files.
     """
     with _opened(path, _tree) as tree:
         yield tree

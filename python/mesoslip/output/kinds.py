@@ -47,7 +47,7 @@ def kind_of(tree: Tree) -> str:
 
 
 def kind_of_all(trees: Sequence[Tree], names: Sequence[str]) -> str:
-    """The common kind of outputs for one picture or page; a `FileError` if there are several."""
+    """The kind of outputs for one picture or page; raises a `FileError` if there are several."""
     kinds = {kind_of(tree): name for tree, name in zip(trees, names, strict=True)}
     if len(kinds) > 1:
         found = ", ".join(f"{name} is {KINDS[kind].description}" for kind, name in kinds.items())

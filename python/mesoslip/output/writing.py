@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from mesoslip.simulation.run_realizations import Results
 
-# Number of values from which a variable is compressed.
+# Number of values above which a variable is compressed.
 MIN_COMPRESSED = 1000
 
 COMPRESSION: dict[str, Any] = {"zlib": True, "complevel": COMPRESSION_LEVEL, "shuffle": True}

@@ -100,7 +100,7 @@ class Archive:
 
 
 def entries(words: Words) -> Iterator[Entry]:
-    """The entries of a state in their order; a `RunError` if the words are not a state."""
+    """The entries of a state in their order; raises a `RunError` if the words are not a state."""
     place = 0
     while place < len(words):
         heading = words[place : place + HEADING_WORDS]

@@ -157,7 +157,7 @@ class Checkpoint:
     def restore(self, realizations: Sequence[Realization]) -> float:
         """Restore realizations from the checkpoint, if there is one; returns its wall time [s].
 
-        A `FileError` if the checkpoint is of another configuration or program, or in use.
+        Raises a `FileError` if it is of another configuration or program, or in use.
         """
         with suppress(OSError):
             self._files.lock()
@@ -330,7 +330,7 @@ class Checkpoint:
         return self._earlier_seconds
 
     def _compare(self, header: dict[str, Any]) -> None:
-        """Refuse a state of another configuration or program with a `FileError`."""
+        """Refuse a state of another configuration or program."""
         advice = (
             "; without --resume the run starts from the beginning, and with another output (-o) "
             "this checkpoint is kept"

@@ -44,7 +44,7 @@ class Progress(NamedTuple):
 
 
 def checked(results: Any) -> tuple[Any, ...]:
-    """Results of a kernel without its status and message; a `RunError` if it failed."""
+    """Results of a kernel without its status and message; raises a `RunError` if it failed."""
     *values, status, message = results
     if status != 0:
         raise RunError(message.decode().strip())

@@ -64,7 +64,7 @@ class Stored:
         return self.shape[0]
 
     def load(self) -> Array:
-        """Read them; a `RunError` if they are not what was written."""
+        """Read them; raises a `RunError` if they differ from the written rows."""
         count = self.shape[0] * self.shape[1]
         try:
             values = np.fromfile(self.path, dtype=np.float64, count=count, offset=self.place)

@@ -120,6 +120,14 @@ def follow(config: Config, parameters: Parameters, number: int, end: End) -> tup
     return kernel, Start(kernel.ask(), slips, energy)
 
 
+def drive_displacement(archive: Archive, slider: str) -> float:
+    """Displacement of the drive in a state [m]."""
+    value, rate, time, start = (
+        archive.number(slider, name) for name in ("drive value", "drive rate", "time", "drive time")
+    )
+    return value + rate * (time - start)
+
+
 def put_on_spring(archive: Archive, slider: str, before: Config, config: Config) -> None:
     """Change spring and damper of a rigid slider in a state.
 
@@ -127,10 +135,7 @@ def put_on_spring(archive: Archive, slider: str, before: Config, config: Config)
     displaced, so that the spring bears the same force.
     """
     here, value = (archive.number(slider, name) for name in ("displacement", "drive value"))
-    time, since, rate = (
-        archive.number(slider, name) for name in ("time", "drive time", "drive rate")
-    )
-    drive = value + rate * (time - since)
+    drive = drive_displacement(archive, slider)
     gap = (drive - here) * before.spring_stiffness / config.spring_stiffness
     archive.set_number(slider, "drive value", value + (here + gap - drive))
     earlier, now = before.slider.oscillator, config.slider.oscillator

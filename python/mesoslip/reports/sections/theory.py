@@ -23,7 +23,7 @@ def curve(subjects: Sequence[Subject]) -> Section:
 
 def cycle(subjects: Sequence[Subject]) -> Section:
     """Numbers of settled cycles."""
-    from mesoslip.cycles.cycle import SUMMARY
+    from mesoslip.cycles.cycle_result import SUMMARY
 
     return _numbers("Settled motion", subjects, SUMMARY)
 

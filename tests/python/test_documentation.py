@@ -65,8 +65,8 @@ SHORTER = {
     'duration = "100 s"': 'duration = "9 s"',
     'duration = "20 s"': 'duration = "0.3 s"',
     "count = 1_000_000": "count = 20_000",
-    # Klein's case, for pages on the master equation.
-    '[run]\nengine = "eq"': '[run]\nresolution = 0.5\nengine = "eq"',
+    # Klein's case, for pages on the master equation and the force curve.
+    '[run]\nengine = "eq"': '[curve]\nlength = "40 nm"\n\n[run]\nresolution = 1.0\nengine = "eq"',
 }
 FORMULAS = [name for name, law in LAWS.items() if not law.is_sampled]
 # Lists of names that pages have: the passage, the form of a name in it, and all names.
@@ -142,7 +142,7 @@ def make_shorter(path):
 
 
 @pytest.fixture
-def workshop(tmp_path, monkeypatch):
+def workshop(tmp_path, monkeypatch, few_replicas):
     """A folder as a reader has it: a clone's runs, an example, an output of it, a table."""
     shutil.copytree(ROOT / "runs", tmp_path / "runs")
     for path in tmp_path.rglob("*.toml"):

@@ -45,7 +45,9 @@ def test_stationary_sliding_is_stationary(klein, law, coupling, back):
 
 @pytest.mark.parametrize("law", ["gaussian", "lognormal", "weibull", "exponential", "uniform"])
 def test_the_far_end_is_stationary_sliding(klein, law):
-    curve = ForceCurve(klein(curve={"length": 400 * STRETCH}, **dispersion(0.3, law)))
+    curve = ForceCurve(
+        klein(curve={"length": 400 * STRETCH, "tolerance": 1e-7}, **dispersion(0.3, law))
+    )
     lacks = abs(curve.force(curve.samples[-1]) - curve.steady_force) / FORCE
     assert lacks < (1e-8 if law != "uniform" else 2 * curve.error + 2 * curve.conservation_error)
 
@@ -63,7 +65,7 @@ def test_the_first_generation_has_a_closed_form(klein):
 
 def test_what_the_formulas_of_the_source_give(klein):
     """Model section 7, second column."""
-    narrow = ForceCurve(klein(**EQUAL, **dispersion(0.01)))
+    narrow = ForceCurve(klein(curve__length=3 * STRETCH, **EQUAL, **dispersion(0.01)))
     assert narrow.K_star[0] == pytest.approx(7.8e4, rel=0.003)
     assert narrow.critical_points[0].D0 == pytest.approx(0.970, abs=5e-4)
     wide = ForceCurve(klein(**EQUAL, **dispersion(0.1)))
@@ -96,7 +98,7 @@ def test_all_solutions_of_the_instability(klein):
 
 def test_a_stiff_spring_has_no_instability(klein):
     """An answer, not an error."""
-    curve = ForceCurve(klein(slider__stiffness=3e5, **EQUAL))
+    curve = ForceCurve(klein(slider__stiffness=3e5, curve__length=3 * STRETCH, **EQUAL))
     assert curve.stable
     assert curve.critical_points == ()
     summary = curve.summary()
@@ -213,12 +215,14 @@ def test_the_error_estimate_holds(klein):
     assert rough.digits <= fine.digits
 
 
-@pytest.mark.parametrize("coupling", ["scaled", "equal"])
 @pytest.mark.parametrize(
-    ("initial", "newborn_width"),
+    ("coupling", "initial", "newborn_width"),
     [
-        *(("relaxed", 0.0), ("steady", 0.0), ("uniform", 2e-10)),
-        *(long("uniform", 0.0), long("relaxed", 2e-10)),
+        *(("scaled", "relaxed", 0.0), ("equal", "steady", 0.0), ("equal", "uniform", 2e-10)),
+        *(long("equal", "relaxed", 0.0), long("scaled", "steady", 0.0)),
+        *(long(coupling, "uniform", 0.0) for coupling in ("scaled", "equal")),
+        *(long(coupling, "relaxed", 2e-10) for coupling in ("scaled", "equal")),
+        long("scaled", "uniform", 2e-10),
     ],
 )
 def test_the_distribution_of_stretches(klein, coupling, initial, newborn_width):
@@ -231,7 +235,7 @@ def test_the_distribution_of_stretches(klein, coupling, initial, newborn_width):
             **dispersion(0.15),
         )
     )
-    x = np.linspace(-3e-9, 20e-9, 20001 if newborn_width == 0 else 1001)
+    x = np.linspace(-3e-9, 20e-9, 8001 if newborn_width == 0 else 501)
     for displacement in (3e-9, 25e-9):
         density, atom = curve.stretch_density(x, displacement)
         assert np.all(density >= 0)
@@ -273,20 +277,22 @@ def test_a_rough_law_reports_its_digits(klein):
 @pytest.mark.parametrize(
     ("width", "newborn_width"),
     [
-        *((0.01, 9e-11), (0.05, 2e-9), (0.2, 9e-10)),
-        *(long(0.05, 9e-10), long(0.2, 9e-11), long(0.2, 2e-9)),
+        *((0.01, 9e-11), (0.2, 9e-10)),
+        *(long(0.05, 9e-10), long(0.05, 2e-9), long(0.2, 9e-11), long(0.2, 2e-9)),
     ],
 )
 def test_newborns_of_any_spread_are_conserved(klein, width, newborn_width):
-    curve = ForceCurve(klein(curve={"newborn_width": newborn_width}, **dispersion(width)))
+    near = {"newborn_width": newborn_width, "length": 4 * STRETCH}
+    curve = ForceCurve(klein(curve=near, **dispersion(width)))
     assert curve.conservation_error < 1e-6
     assert curve.error >= curve.conservation_error
 
 
 def test_a_spring_just_too_soft(klein):
     """The two solutions next to K* are found however close they are."""
-    stiffness = ForceCurve(klein()).K_star[0]
-    curve = ForceCurve(klein(slider__stiffness=stiffness * (1 - 1e-8)))
+    near = {"curve__length": 3 * STRETCH}
+    stiffness = ForceCurve(klein(**near)).K_star[0]
+    curve = ForceCurve(klein(slider__stiffness=stiffness * (1 - 1e-8), **near))
     assert not curve.stable
     assert len(curve.critical_points) == 2
 
@@ -376,11 +382,19 @@ def test_a_base_is_in_series_with_the_spring(klein):
 @pytest.mark.parametrize("coupling", ["equal", "scaled"])
 def test_the_estimate_is_as_near_as_the_verdict_states(klein, law, width, coupling):
     config = klein(
-        contacts__threshold={"law": law, "relative_width": width}, contacts__coupling=coupling
+        contacts__threshold={"law": law, "relative_width": width},
+        contacts__coupling=coupling,
+        curve={"length": 3 * STRETCH, "tolerance": 1e-4},
     )
     estimate = derived(config)["K_star_estimate"].value
     low, high = ESTIMATE_RANGE
     assert low < ForceCurve(config).K_star[0] / estimate < high
+
+
+def test_the_verdict_compares_with_the_estimate(klein):
+    config = klein()
+    estimate = derived(config)["K_star_estimate"].value
+    low, high = ESTIMATE_RANGE
     for factor, words in (
         (low / 1.1, "below the estimate"),
         (1.1 * low, "times the estimate"),
@@ -393,15 +407,16 @@ def test_the_estimate_is_as_near_as_the_verdict_states(klein, law, width, coupli
 def test_verdicts_say_what_they_do_not_mean(klein, command, tmp_path):
     """K < K* is neither necessary nor sufficient for stick-slip with delay: K = 200 N/m and 0.3 ms
     slide smoothly after 5 s."""
-    soft = klein(slider__stiffness=200.0, contacts__delay=3e-4)
+    near = {"curve__length": 3 * STRETCH}
+    soft = klein(slider__stiffness=200.0, contacts__delay=3e-4, **near)
     assert "decide whether slips continue" in ForceCurve(soft).verdict
     assert "delay" in ForceCurve(soft).verdict
     assert "necessary" not in ForceCurve(soft).verdict
-    stiff = ForceCurve(klein(slider__stiffness=1e6))
+    stiff = ForceCurve(klein(slider__stiffness=1e6, **near))
     assert stiff.stable
     assert "slow sliding" in stiff.verdict
     assert "stick-slip nevertheless" in stiff.verdict
-    assert "follows the drive" in ForceCurve(klein(slider={"kind": "prescribed"})).verdict
+    assert "follows the drive" in ForceCurve(klein(slider={"kind": "prescribed"}, **near)).verdict
     path = tmp_path / "soft.toml"
     path.write_text(soft.to_toml())
     for name in ("curve", "onset", "info"):

@@ -142,7 +142,7 @@ def make_shorter(path):
 
 
 @pytest.fixture
-def workshop(tmp_path, monkeypatch, few_replicas):
+def workshop(tmp_path, monkeypatch, few_replicas):  # noqa: ARG001
     """A folder as a reader has it: a clone's runs, an example, an output of it, a table."""
     shutil.copytree(ROOT / "runs", tmp_path / "runs")
     for path in tmp_path.rglob("*.toml"):

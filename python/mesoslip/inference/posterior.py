@@ -249,7 +249,7 @@ def summaries_group(
     low[defined], middle[defined], high[defined] = np.nanpercentile(
         predicted[:, defined], [5, 50, 95], axis=0
     )
-    numbers = {
+    numbers: dict[str, Any] = {
         "observed": observed,
         "predicted_05": low,
         "predicted_50": middle,

@@ -1,7 +1,7 @@
-!> Handles of simulations: how Python holds what lives in Fortran.
+!> Handles of simulations, by which Python refers to them.
 !>
 !> A handle is the address of a simulation and a stamp that the simulation bears as well. Closing it
-!> makes both zero, so whoever uses it afterwards gets an error.
+!> makes both zero, so that its use afterwards is an error.
 module mesoslip_boundary_handles
    use, intrinsic :: iso_c_binding, only: c_f_pointer, c_intptr_t, c_loc, c_null_ptr, c_ptr
    use mesoslip_numerics_errors, only: error_type, raise, status_invalid, status_ok
@@ -14,6 +14,8 @@ module mesoslip_boundary_handles
    integer, parameter :: message_length = 200
 
    public :: open_handle, close_handle, find_simulation, report
+   ! For the procedures that Python calls.
+   public :: error_type, simulation_type
 
    !> Stamp of every simulation, besides its address
    integer(i8), parameter :: stamp = int(z'6D65736F736C6970', i8)
@@ -61,7 +63,7 @@ contains
       !> Whether it must have all its parts
       logical, intent(in) :: whole
       type(simulation_type), pointer, intent(out) :: simulation
-      !> Set if there is none, or a part is missing
+      !> Set if it was closed, or a part is missing
       type(error_type), allocatable, intent(out) :: error
 
       type(stamped_type), pointer :: stamped
@@ -78,7 +80,7 @@ contains
          & "the simulation lacks contacts, a slider, a drive, or what is to be recorded")
    end subroutine find_simulation
 
-   !> The simulation of a handle; null if there is none.
+   !> The simulation of a handle; null if it was closed.
    subroutine find(handle, stamped)
       integer(i8), intent(in) :: handle(2)
       type(stamped_type), pointer, intent(out) :: stamped
@@ -92,11 +94,9 @@ contains
       if (stamped%stamp /= handle(2)) stamped => null()
    end subroutine find
 
-   !> Tell an error to the caller.
+   !> Report an error, or success, to Python.
    subroutine report(error, status, message)
-      !> The error, unallocated if there is none
       type(error_type), allocatable, intent(in) :: error
-      !> Its status, and its message
       integer, intent(out) :: status
       character(len=message_length), intent(out) :: message
 

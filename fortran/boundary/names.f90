@@ -26,9 +26,8 @@ contains
 
    !> A list of names.
    subroutine find_names(list, names, error)
-      !> Which list
       character(len=*), intent(in) :: list
-      !> The names, none of them blank
+      !> The names, all without blanks
       character(len=name_length), allocatable, intent(out) :: names(:)
       !> Set if there is no such list
       type(error_type), allocatable, intent(out) :: error

@@ -5,10 +5,8 @@ subroutine set_contacts(handle, kind, length, names, values, words, seed, realiz
    & message)
    !f2py threadsafe
    use mesoslip_contacts, only: make_contacts
-   use mesoslip_boundary_handles, only: find_simulation, report
-   use mesoslip_numerics_errors, only: error_type
+   use mesoslip_boundary_handles, only: error_type, find_simulation, report, simulation_type
    use mesoslip_numerics_parameters, only: new_parameters, parameters_type
-   use mesoslip_loop_simulation, only: simulation_type
    implicit none
    integer(8), intent(in) :: handle(2)
    !> Kind of the contacts, and their parameters by name, numbers or words
@@ -36,12 +34,10 @@ end subroutine set_contacts
 !> Give a simulation the contacts of another one, which has not been started.
 subroutine copy_contacts(handle, template, status, message)
    !f2py threadsafe
-   use mesoslip_boundary_handles, only: find_simulation, report
-   use mesoslip_numerics_errors, only: error_type, raise, status_invalid, status_memory
-   use mesoslip_loop_simulation, only: simulation_type
+   use mesoslip_boundary_handles, only: error_type, find_simulation, report, simulation_type
+   use mesoslip_numerics_errors, only: raise, status_invalid, status_memory
    implicit none
    integer(8), intent(in) :: handle(2)
-   !> Handle of the other one
    integer(8), intent(in) :: template(2)
    integer, intent(out) :: status
    character(len=200), intent(out) :: message
@@ -70,10 +66,8 @@ end subroutine copy_contacts
 !> Give a simulation its slider.
 subroutine set_slider(handle, kind, length, names, values, words, status, message)
    !f2py threadsafe
-   use mesoslip_boundary_handles, only: find_simulation, report
-   use mesoslip_numerics_errors, only: error_type
+   use mesoslip_boundary_handles, only: error_type, find_simulation, report, simulation_type
    use mesoslip_numerics_parameters, only: new_parameters, parameters_type
-   use mesoslip_loop_simulation, only: simulation_type
    use mesoslip_sliders, only: make_slider
    implicit none
    integer(8), intent(in) :: handle(2)
@@ -100,13 +94,12 @@ end subroutine set_slider
 !> Give a simulation, which has its slider, a drive of constant acceleration in each of its parts.
 subroutine set_drive(handle, parts, part_end, start_rate, end_rate, stage, status, message)
    !f2py threadsafe
-   use mesoslip_boundary_handles, only: find_simulation, report
-   use mesoslip_numerics_errors, only: error_type, raise, status_invalid
-   use mesoslip_loop_simulation, only: simulation_type
+   use mesoslip_boundary_handles, only: error_type, find_simulation, report, simulation_type
+   use mesoslip_numerics_errors, only: raise, status_invalid
    implicit none
    integer(8), intent(in) :: handle(2)
-   !> Number of parts; when each ends [s], rates of the drive at its start and at its end, [m/s], or
-   !> [N/s] if it is a force, and the number of the stage that it is of
+   !> Number of parts; end of each [s], rates of the drive at its start and at its end, [m/s], or
+   !> [N/s] of a force, and number of its stage
    integer, intent(in) :: parts
    real(8), intent(in) :: part_end(parts), start_rate(parts), end_rate(parts)
    integer, intent(in) :: stage(parts)
@@ -131,9 +124,8 @@ end subroutine set_drive
 !> Give a simulation, which has its drive, the values at which the parts of the drive start.
 subroutine set_drive_values(handle, parts, start_value, status, message)
    !f2py threadsafe
-   use mesoslip_boundary_handles, only: find_simulation, report
-   use mesoslip_numerics_errors, only: error_type, raise, status_invalid
-   use mesoslip_loop_simulation, only: simulation_type
+   use mesoslip_boundary_handles, only: error_type, find_simulation, report, simulation_type
+   use mesoslip_numerics_errors, only: raise, status_invalid
    implicit none
    integer(8), intent(in) :: handle(2)
    !> Number of parts; value at the start of each, a force [N]
@@ -156,20 +148,18 @@ subroutine set_drive_values(handle, parts, start_value, status, message)
    call report(error, status, message)
 end subroutine set_drive_values
 
-!> Set when a simulation stops before its drive ends.
+!> Set the conditions that end a simulation before its drive.
 subroutine set_stop(handle, slips, displacement, block_distance, blocks, tolerance, status, message)
    !f2py threadsafe
-   use mesoslip_boundary_handles, only: find_simulation, report
-   use mesoslip_numerics_errors, only: error_type
-   use mesoslip_loop_simulation, only: simulation_type
+   use mesoslip_boundary_handles, only: error_type, find_simulation, report, simulation_type
    implicit none
    integer(8), intent(in) :: handle(2)
-   !> Number of slips, 0 for any
+   !> Number of slips; 0: any
    integer(8), intent(in) :: slips
-   !> Displacement of the slider to come to [m], 0 for any
+   !> Displacement of the slider to reach [m]; 0: any
    real(8), intent(in) :: displacement
-   !> Distance of the drive in a block [m], 0 for not to stop at a steady state; blocks that
-   !> are compared with as many before; difference of the mean forces that counts as none [N]
+   !> Steady state: distance of the drive in a block [m], 0: not looked for; number of blocks in a
+   !> mean; difference of mean forces that is ignored [N]
    real(8), intent(in) :: block_distance
    integer, intent(in) :: blocks
    real(8), intent(in) :: tolerance
@@ -188,23 +178,22 @@ subroutine set_stop(handle, slips, displacement, block_distance, blocks, toleran
    call report(error, status, message)
 end subroutine set_stop
 
-!> Set what a simulation, which has its contacts, records of the motion.
+!> Set the record of the motion of a simulation, which has its contacts.
 subroutine set_recorder(handle, interval, slip_interval, slip_velocity, quiet_time, duration, &
    & layers, status, message)
    !f2py threadsafe
-   use mesoslip_boundary_handles, only: find_simulation, report
-   use mesoslip_numerics_errors, only: error_type, raise, status_invalid
+   use mesoslip_boundary_handles, only: error_type, find_simulation, report, simulation_type
+   use mesoslip_numerics_errors, only: raise, status_invalid
    use mesoslip_recording_recorder, only: recorder_parameters_type
    use mesoslip_recording_slips, only: slip_parameters_type
-   use mesoslip_loop_simulation, only: simulation_type
    implicit none
    integer(8), intent(in) :: handle(2)
-   !> Interval of the trace, and of the finer traces, 0 for none [s]
+   !> Interval of the trace, and of the finer traces, 0: no finer traces [s]
    real(8), intent(in) :: interval, slip_interval
-   !> Velocity above the drive's that makes a slip [m/s], 0 for none; half a period of the setup,
+   !> Velocity above the drive's that makes a slip [m/s], 0: no slips; half a period of the setup,
    !> duration of the run [s]
    real(8), intent(in) :: slip_velocity, quiet_time, duration
-   !> Layers whose displacements go with the trace
+   !> Number of layers whose displacements are recorded with the trace
    integer, intent(in) :: layers
    integer, intent(out) :: status
    character(len=200), intent(out) :: message
@@ -225,19 +214,18 @@ subroutine set_recorder(handle, interval, slip_interval, slip_velocity, quiet_ti
    call report(error, status, message)
 end subroutine set_recorder
 
-!> Set what a simulation, which has its contacts, records of avalanches.
+!> Set the record of avalanches of a simulation, which has its contacts.
 subroutine set_avalanches(handle, min_size, snapshot_size, max_avalanches, snapshots, &
    & snapshot_time, status, message)
    !f2py threadsafe
-   use mesoslip_boundary_handles, only: find_simulation, report
-   use mesoslip_numerics_errors, only: error_type, raise, status_invalid
+   use mesoslip_boundary_handles, only: error_type, find_simulation, report, simulation_type
+   use mesoslip_numerics_errors, only: raise, status_invalid
    use mesoslip_recording_avalanches, only: avalanche_parameters_type
-   use mesoslip_loop_simulation, only: simulation_type
    implicit none
    integer(8), intent(in) :: handle(2)
-   !> Minimum sizes of avalanches in the catalogue and with a snapshot, 0 for none
+   !> Minimum sizes of avalanches in the catalogue, and with a snapshot; 0: neither
    real(8), intent(in) :: min_size, snapshot_size
-   !> Avalanches after which the run is over, 0 for any number
+   !> Number of avalanches after which the run ends; 0: any
    integer(8), intent(in) :: max_avalanches
    !> Times of snapshots [s]
    integer, intent(in) :: snapshots

@@ -1,6 +1,6 @@
 ! The random numbers as Python calls them, wrapped by f2py.
 
-!> Philox 4x32-10, for its tests and for whoever wants the same numbers elsewhere.
+!> Philox 4x32-10, for tests and for other programs that need the same numbers.
 subroutine philox(length, counter, key, word)
    !f2py threadsafe
    use mesoslip_numerics_random, only: philox4x32

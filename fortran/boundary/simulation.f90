@@ -1,7 +1,8 @@
 ! A simulation as Python calls it: flat subroutines with explicit shapes, wrapped by f2py.
 !
 ! A simulation lives here; Python holds its handle, two numbers that only these procedures read.
-! Each has a status and a message as its last arguments; status 0 means success. None keeps state.
+! Each procedure has a status and a message as its last arguments; status 0 means success. No
+! procedure keeps state.
 
 !> Set up a simulation without parts.
 subroutine open_simulation(handle)
@@ -13,7 +14,7 @@ subroutine open_simulation(handle)
    call open_handle(handle)
 end subroutine open_simulation
 
-!> Free a simulation; its handle is of no use afterwards.
+!> Free a simulation; its handle is invalid afterwards.
 subroutine close_simulation(handle)
    !f2py threadsafe
    use mesoslip_boundary_handles, only: close_handle
@@ -28,10 +29,8 @@ end subroutine close_simulation
 subroutine start_simulation(handle, initial, status, message)
    !f2py threadsafe
    use mesoslip_contacts_mechanics, only: initial_names
-   use mesoslip_boundary_handles, only: find_simulation, report
-   use mesoslip_numerics_errors, only: error_type
+   use mesoslip_boundary_handles, only: error_type, find_simulation, report, simulation_type
    use mesoslip_numerics_parameters, only: choose
-   use mesoslip_loop_simulation, only: simulation_type
    implicit none
    integer(8), intent(in) :: handle(2)
    !> Initial state of the contacts
@@ -49,15 +48,13 @@ subroutine start_simulation(handle, initial, status, message)
    call report(error, status, message)
 end subroutine start_simulation
 
-!> Go on for some advances or some work, or until much waits to be drained, or until the end.
+!> Continue until the end of the run or of a segment, or until a table should be drained.
 subroutine advance_simulation(handle, max_advances, max_work, status, message)
    !f2py threadsafe
-   use mesoslip_boundary_handles, only: find_simulation, report
-   use mesoslip_numerics_errors, only: error_type
-   use mesoslip_loop_simulation, only: simulation_type
+   use mesoslip_boundary_handles, only: error_type, find_simulation, report, simulation_type
    implicit none
    integer(8), intent(in) :: handle(2)
-   !> Largest number of advances; work in units of an advance of a rigid slider
+   !> Advances and work in the segment: 1 for an advance of a rigid slider or a break
    integer(8), intent(in) :: max_advances
    real(8), intent(in) :: max_work
    integer, intent(out) :: status
@@ -71,20 +68,18 @@ subroutine advance_simulation(handle, max_advances, max_work, status, message)
    call report(error, status, message)
 end subroutine advance_simulation
 
-!> How far a simulation has come.
+!> Progress of a simulation.
 subroutine ask_simulation(handle, ending, time, displacement, breaks, detached, avalanche_slip, &
    & error_estimate, advances, avalanches, integrator, status, message)
    !f2py threadsafe
-   use mesoslip_boundary_handles, only: find_simulation, report
-   use mesoslip_numerics_errors, only: error_type
+   use mesoslip_boundary_handles, only: error_type, find_simulation, report, simulation_type
    use mesoslip_loop_endings, only: ending_names
-   use mesoslip_loop_simulation, only: simulation_type
    implicit none
    integer(8), intent(in) :: handle(2)
-   !> Why the run is over, blank if it is not
+   !> Reason for the end of the run, blank before it
    character(len=32), intent(out) :: ending
-   !> Time [s], displacement of the slider [m], breaks so far, contacts that are detached, slip in
-   !> avalanches [m], estimated error of the contact force [N]
+   !> Time [s], displacement of the slider [m], breaks so far, detached contacts, slip in avalanches
+   !> [m], estimated error of the contact force [N]
    real(8), intent(out) :: time, displacement, breaks, detached, avalanche_slip, error_estimate
    !> Advances and avalanches so far; steps, evaluations and failed steps of the integrator
    integer(8), intent(out) :: advances, avalanches, integrator(3)
@@ -123,14 +118,10 @@ end subroutine ask_simulation
 !> Terms of the energy balance of a simulation.
 subroutine ask_energy(handle, energy, status, message)
    !f2py threadsafe
-   use mesoslip_boundary_handles, only: find_simulation, report
-   use mesoslip_numerics_errors, only: error_type
-   use mesoslip_loop_simulation, only: simulation_type
+   use mesoslip_boundary_handles, only: error_type, find_simulation, report, simulation_type
    implicit none
    integer(8), intent(in) :: handle(2)
-   !> Work of the drive; energy of the slider and its spring, of the contacts; losses by damping, by
-   !> drag, by breaking; gain by attaching; work of steps beyond that of the contacts; what the
-   !> balance lacks [J]
+   !> Terms in the order of the list of names "energy" [J]
    real(8), intent(out) :: energy(9)
    integer, intent(out) :: status
    character(len=200), intent(out) :: message
@@ -147,9 +138,8 @@ end subroutine ask_energy
 !> State of each contact: origin [m], stiffness [N/m], breaking stretch [m], renewals.
 subroutine ask_contacts(handle, count, values, status, message)
    !f2py threadsafe
-   use mesoslip_boundary_handles, only: find_simulation, report
-   use mesoslip_numerics_errors, only: error_type, raise, status_invalid
-   use mesoslip_loop_simulation, only: simulation_type
+   use mesoslip_boundary_handles, only: error_type, find_simulation, report, simulation_type
+   use mesoslip_numerics_errors, only: raise, status_invalid
    implicit none
    integer(8), intent(in) :: handle(2)
    !> Number of contacts
@@ -174,13 +164,12 @@ subroutine ask_contacts(handle, count, values, status, message)
    call report(error, status, message)
 end subroutine ask_contacts
 
-!> Rows of a table that wait to be drained.
+!> Number of rows of a table that can be drained.
 subroutine count_rows(handle, table, columns, rows, status, message)
    !f2py threadsafe
-   use mesoslip_boundary_handles, only: find_simulation, report
-   use mesoslip_numerics_errors, only: error_type, raise, status_invalid
+   use mesoslip_boundary_handles, only: error_type, find_simulation, report, simulation_type
+   use mesoslip_numerics_errors, only: raise, status_invalid
    use mesoslip_recording_buffer, only: buffer_type
-   use mesoslip_loop_simulation, only: simulation_type
    implicit none
    integer(8), intent(in) :: handle(2)
    !> Name of the table
@@ -209,17 +198,15 @@ subroutine count_rows(handle, table, columns, rows, status, message)
    call report(error, status, message)
 end subroutine count_rows
 
-!> Take the first rows of a table away.
+!> Remove the first rows of a table and return them.
 subroutine drain_rows(handle, table, columns, rows, values, status, message)
    !f2py threadsafe
-   use mesoslip_boundary_handles, only: find_simulation, report
-   use mesoslip_numerics_errors, only: error_type
-   use mesoslip_loop_simulation, only: simulation_type
+   use mesoslip_boundary_handles, only: error_type, find_simulation, report, simulation_type
    implicit none
    integer(8), intent(in) :: handle(2)
    !> Name of the table
    character(len=*), intent(in) :: table
-   !> Numbers in a row, and rows: as many as wait or fewer
+   !> Numbers in a row, and rows: no more than can be drained
    integer, intent(in) :: columns, rows
    real(8), intent(inout) :: values(columns, rows)
    integer, intent(out) :: status
@@ -236,12 +223,10 @@ end subroutine drain_rows
 !> Displace the drive of a simulation at once, as a small perturbation.
 subroutine displace_drive(handle, distance, status, message)
    !f2py threadsafe
-   use mesoslip_boundary_handles, only: find_simulation, report
-   use mesoslip_numerics_errors, only: error_type
-   use mesoslip_loop_simulation, only: simulation_type
+   use mesoslip_boundary_handles, only: error_type, find_simulation, report, simulation_type
    implicit none
    integer(8), intent(in) :: handle(2)
-   !> How far [m]
+   !> Displacement [m]
    real(8), intent(in) :: distance
    integer, intent(out) :: status
    character(len=200), intent(out) :: message
@@ -254,12 +239,11 @@ subroutine displace_drive(handle, distance, status, message)
    call report(error, status, message)
 end subroutine displace_drive
 
-!> Go on from the end of another run, whose state was restored: the first part of the drive is over.
+!> Continue from the end of another run, whose state was restored: the first part of the drive is
+!> over.
 subroutine follow_simulation(handle, status, message)
    !f2py threadsafe
-   use mesoslip_boundary_handles, only: find_simulation, report
-   use mesoslip_numerics_errors, only: error_type
-   use mesoslip_loop_simulation, only: simulation_type
+   use mesoslip_boundary_handles, only: error_type, find_simulation, report, simulation_type
    implicit none
    integer(8), intent(in) :: handle(2)
    integer, intent(out) :: status
@@ -276,9 +260,7 @@ end subroutine follow_simulation
 !> Put the state of a simulation into an archive, which the simulation keeps until it is fetched.
 subroutine save_simulation(handle, length, status, message)
    !f2py threadsafe
-   use mesoslip_boundary_handles, only: find_simulation, report
-   use mesoslip_numerics_errors, only: error_type
-   use mesoslip_loop_simulation, only: simulation_type
+   use mesoslip_boundary_handles, only: error_type, find_simulation, report, simulation_type
    implicit none
    integer(8), intent(in) :: handle(2)
    !> Number of words of the archive
@@ -295,12 +277,10 @@ subroutine save_simulation(handle, length, status, message)
    call report(error, status, message)
 end subroutine save_simulation
 
-!> Fetch the archive that a simulation has kept.
+!> Fetch the archive of a simulation.
 subroutine fetch_state(handle, length, words, status, message)
    !f2py threadsafe
-   use mesoslip_boundary_handles, only: find_simulation, report
-   use mesoslip_numerics_errors, only: error_type
-   use mesoslip_loop_simulation, only: simulation_type
+   use mesoslip_boundary_handles, only: error_type, find_simulation, report, simulation_type
    implicit none
    integer(8), intent(in) :: handle(2)
    !> Number of words of the archive
@@ -317,12 +297,10 @@ subroutine fetch_state(handle, length, words, status, message)
    call report(error, status, message)
 end subroutine fetch_state
 
-!> Go on from an archive, in a simulation that has all its parts and was not started.
+!> Continue from an archive, in a simulation that has all its parts and was not started.
 subroutine restore_simulation(handle, length, words, status, message)
    !f2py threadsafe
-   use mesoslip_boundary_handles, only: find_simulation, report
-   use mesoslip_numerics_errors, only: error_type
-   use mesoslip_loop_simulation, only: simulation_type
+   use mesoslip_boundary_handles, only: error_type, find_simulation, report, simulation_type
    implicit none
    integer(8), intent(in) :: handle(2)
    !> The archive
@@ -339,17 +317,15 @@ subroutine restore_simulation(handle, length, words, status, message)
    call report(error, status, message)
 end subroutine restore_simulation
 
-!> A list of names that both sides share: columns of a table, or kinds of something.
+!> A list of names that both sides share: columns of a table, or kinds.
 subroutine list_names(which, room, names, count, status, message)
    !f2py threadsafe
-   use mesoslip_boundary_handles, only: report
+   use mesoslip_boundary_handles, only: error_type, report
    use mesoslip_boundary_names, only: find_names
-   use mesoslip_numerics_errors, only: error_type
    use mesoslip_numerics_parameters, only: name_length
    implicit none
-   !> Which list
    character(len=*), intent(in) :: which
-   !> Names for which there is room
+   !> Room for names
    integer, intent(in) :: room
    !> The names, and their number
    character(len=32), intent(out) :: names(room)

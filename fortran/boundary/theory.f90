@@ -1,12 +1,12 @@
 ! The theory as Python calls it: flat subroutines with explicit shapes, wrapped by f2py.
 !
-! Each has a status and a message as its last arguments; status 0 means success. None keeps state.
+! Each procedure has a status and a message as its last arguments; status 0 means success. No
+! procedure keeps state.
 
 !> Scales of the lives of contacts under a slider that moves forward, dimensionless.
 subroutine contact_scales(length, names, values, words, scales, status, message)
    !f2py threadsafe
-   use mesoslip_boundary_handles, only: report
-   use mesoslip_numerics_errors, only: error_type
+   use mesoslip_boundary_handles, only: error_type, report
    use mesoslip_numerics_parameters, only: new_parameters, parameters_type
    use mesoslip_theory_lives, only: contact_lives_type, make_contact_lives
    implicit none
@@ -26,9 +26,7 @@ subroutine contact_scales(length, names, values, words, scales, status, message)
    scales = 0.0d0
    call new_parameters(parameters, names, values, words)
    call make_contact_lives(lives, parameters, error)
-   if (.not. allocated(error)) then
-      scales = lives%scales()
-   end if
+   if (.not. allocated(error)) scales = lives%scales()
    call report(error, status, message)
 end subroutine contact_scales
 
@@ -36,8 +34,7 @@ end subroutine contact_scales
 subroutine force_curve(length, names, values, words, start, width, panels, points, point, breaks, &
    & slope, force, stiffness, pinned_part, mismatch, status, message)
    !f2py threadsafe
-   use mesoslip_boundary_handles, only: report
-   use mesoslip_numerics_errors, only: error_type
+   use mesoslip_boundary_handles, only: error_type, report
    use mesoslip_numerics_parameters, only: new_parameters, parameters_type
    use mesoslip_theory_lives, only: contact_lives_type, make_contact_lives
    use mesoslip_theory_renewal, only: renewal_solution_type, solve_renewal
@@ -55,9 +52,9 @@ subroutine force_curve(length, names, values, words, start, width, panels, point
    !> Breaks over displacement, slope of the force, force, stiffness of the pinned contacts
    real(8), intent(out) :: breaks(points, panels), slope(points, panels), force(points, panels), &
       & stiffness(points, panels)
-   !> Part of the contacts that is pinned, at the edges of the panels
+   !> Share of pinned contacts at the edges of the panels
    real(8), intent(out) :: pinned_part(panels + 1)
-   !> Largest difference between two ways to the force
+   !> Maximum difference between the force from two integrals
    real(8), intent(out) :: mismatch
    integer, intent(out) :: status
    character(len=200), intent(out) :: message
@@ -94,8 +91,7 @@ end subroutine force_curve
 subroutine onset(equation, coefficients, damping, drag, end_displacement, interval, tolerance, &
    & capacity, samples, length, ended, status, message)
    !f2py threadsafe
-   use mesoslip_boundary_handles, only: report
-   use mesoslip_numerics_errors, only: error_type
+   use mesoslip_boundary_handles, only: error_type, report
    use mesoslip_numerics_parameters, only: choose
    use mesoslip_theory_onset, only: equation_names, integrate_onset, onset_type
    implicit none
@@ -105,11 +101,11 @@ subroutine onset(equation, coefficients, damping, drag, end_displacement, interv
    real(8), intent(in) :: coefficients(4), damping, drag, end_displacement
    !> Interval of samples, and relative tolerance of the integration
    real(8), intent(in) :: interval, tolerance
-   !> Samples in the order of the list of names "onset", and how many were filled
+   !> Samples in the order of the list of names "onset", and their number
    integer, intent(in) :: capacity
    real(8), intent(inout) :: samples(4, capacity)
    integer, intent(out) :: length
-   !> Whether the equation came to its end
+   !> Whether the end of the equation was reached
    integer, intent(out) :: ended
    integer, intent(out) :: status
    character(len=200), intent(out) :: message
@@ -137,8 +133,8 @@ subroutine evaluate_threshold_law(length, names, values, words, minimum, what, p
    & value, acceptance, status, message)
    !f2py threadsafe
    use mesoslip_numerics_kinds, only: wp
-   use mesoslip_boundary_handles, only: report
-   use mesoslip_numerics_errors, only: error_type, raise, status_invalid
+   use mesoslip_boundary_handles, only: error_type, report
+   use mesoslip_numerics_errors, only: raise, status_invalid
    use mesoslip_numerics_parameters, only: name_length, new_parameters, parameters_type
    use mesoslip_contacts_threshold_laws, only: make_threshold_law
    use mesoslip_contacts_threshold_laws_base, only: threshold_law_type
@@ -191,8 +187,7 @@ subroutine rate_and_state_motions(evolution, states, sets, parameters, reference
    & stages, duration, start_velocity, end_velocity, points, times, tolerance, force, &
    & displacement, failed, status, message)
    !f2py threadsafe
-   use mesoslip_boundary_handles, only: report
-   use mesoslip_numerics_errors, only: error_type
+   use mesoslip_boundary_handles, only: error_type, report
    use mesoslip_numerics_parameters, only: choose
    use mesoslip_theory_rate_and_state, only: evolution_names, friction_type, load_type, &
       & max_states, move_slider

@@ -125,9 +125,7 @@ contains
          if (allocated(error)) exit
       end do
       if (allocated(error)) return
-      call self%recorder%report_failure(error)
-      call self%stages%report_failure(error)
-      call self%avalanches%report_failure(error)
+      call self%report_failure(error)
    end subroutine run
 
    !> Some advances, by the loop for this family of sliders.

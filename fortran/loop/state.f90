@@ -26,6 +26,9 @@ module mesoslip_loop_state
       & "drive_work", "slider_energy", "contact_energy", "damping_loss", "drag_loss", &
       & "break_loss", "birth_gain", "step_work", "residual"]
    integer, parameter :: energy_length = size(energy_columns)
+   !> Names of the tables
+   character(len=*), parameter :: table_names(*) = [character(len=name_length) :: "trace", &
+      & "slip_trace", "slips", "stages", "layers", "avalanches", "snapshot_events", "snapshots"]
 
    !> A slider with its drive, on contacts, and recorders.
    type :: state_type
@@ -64,6 +67,7 @@ module mesoslip_loop_state
       procedure, non_overridable :: table
       procedure, non_overridable :: rows_to_drain
       procedure, non_overridable :: drain
+      procedure, non_overridable :: report_failure
       procedure, non_overridable :: displace_drive
       procedure, non_overridable :: exchange
       procedure, non_overridable :: save
@@ -168,6 +172,24 @@ contains
          call buffer%drain(values)
       end if
    end subroutine drain
+
+   !> Report that not all could be recorded.
+   subroutine report_failure(self, error)
+      class(state_type), intent(inout), target :: self
+      !> Set if there was not enough memory for a row
+      type(error_type), allocatable, intent(inout) :: error
+
+      type(buffer_type), pointer :: buffer
+      integer :: i
+
+      if (allocated(self%recorder%slips%minima%rows%failure)) then
+         error = self%recorder%slips%minima%rows%failure
+      end if
+      do i = 1, size(table_names)
+         buffer => self%table(table_names(i))
+         if (allocated(buffer%failure)) error = buffer%failure
+      end do
+   end subroutine report_failure
 
    !> Displace the drive at once: the motion continues with another length of the spring.
    subroutine displace_drive(self, distance)

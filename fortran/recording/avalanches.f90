@@ -1,11 +1,10 @@
 !> The catalogue of avalanches of a run, and snapshots of its contacts.
 !>
-!> An avalanche is all contacts that break at one time and displacement, one pushing over the next;
-!> under a slider without inertia, all that break at one displacement of the drive.
+!> An avalanche is all contacts that break at one time and displacement, as they push each other
+!> over their thresholds; under a slider without inertia, at one displacement of the drive.
 module mesoslip_recording_avalanches
    use mesoslip_numerics_kinds, only: i8, wp
    use mesoslip_numerics_archive, only: archive_type
-   use mesoslip_numerics_errors, only: error_type
    use mesoslip_numerics_parameters, only: name_length
    use mesoslip_recording_buffer, only: buffer_type
    use mesoslip_contacts_base, only: contacts_type, extent_columns, extent_length, &
@@ -18,50 +17,50 @@ module mesoslip_recording_avalanches
    public :: avalanche_recorder_type, avalanche_parameters_type
    public :: avalanche_columns, snapshot_event_columns
 
-   !> Columns of the catalogue of avalanches: time and displacement are those of the start, forces
-   !> those of the contacts, the size is the number of breaks
+   !> Columns of the catalogue of avalanches: time and displacement of the start, forces of the
+   !> contacts; the size is the number of breaks
    character(len=*), parameter :: avalanche_columns(*) = [character(len=name_length) :: "time", &
       & "displacement", "size", "force_before", "force_drop", "slip", extent_columns]
-   !> Columns of the list of snapshots; the size of an avalanche is 0 if there was none
+   !> Columns of the list of snapshots; size 0: not after an avalanche
    character(len=*), parameter :: snapshot_event_columns(*) = [character(len=name_length) :: &
       & "time", "displacement", "size"]
    integer, parameter :: avalanche_length = size(avalanche_columns)
    integer, parameter :: snapshot_event_length = size(snapshot_event_columns)
 
-   !> Avalanches for which there is room at first
+   !> Initial room for avalanches
    integer, parameter :: initial_room = 1000
-   !> Waiting avalanches, and numbers in snapshots, at which the run pauses to have them taken away
+   !> Numbers of avalanches, and of numbers in snapshots, at which the run pauses so that they are
+   !> drained
    integer, parameter :: pausing_avalanches = 100000, pausing_numbers = 6000000
 
-!> Settings of the record.
+   !> Settings of the record.
    type :: avalanche_parameters_type
-      !> Minimum size of an avalanche in the catalogue; 0 for no catalogue
+      !> Minimum size of an avalanche in the catalogue; 0: no catalogue
       real(wp) :: min_size = 0.0_wp
-      !> Minimum size of an avalanche after which a snapshot is taken; 0 for none
+      !> Minimum size of an avalanche after which a snapshot is taken; 0: no such snapshots
       real(wp) :: snapshot_size = 0.0_wp
-      !> Avalanches after which the run is over
+      !> Number of avalanches after which the run ends
       integer(i8) :: max_avalanches = huge(1_i8)
    end type avalanche_parameters_type
 
-   !> Records avalanches and snapshots into tables that the caller empties.
+   !> Records avalanches and snapshots into tables that the caller drains.
    type :: avalanche_recorder_type
-!> Settings of the record
       type(avalanche_parameters_type) :: parameters
-      !> Avalanches, when snapshots were taken, and the snapshots, all contacts of one in a row
+      !> Avalanches, list of snapshots, and the snapshots, all contacts of one in a row
       type(buffer_type) :: catalogue, events, snapshots
-      !> Avalanches so far, and breaks in all of them
+      !> Avalanches so far
       integer(i8) :: avalanches = 0
       !> Breaks in the present avalanche
       real(wp) :: size = 0.0_wp
 
       !> Slip in avalanches so far [m]
       real(wp) :: slip = 0.0_wp
-      !> Times at which snapshots are taken [s], and how many of them have been
+      !> Times at which snapshots are taken [s], and number of those taken
       real(wp), allocatable, private :: snapshot_time(:)
       integer, private :: taken = 0
-      !> Waiting snapshots at which the run pauses
+      !> Number of snapshots at which the run pauses
       integer, private :: pausing_snapshots = 1
-      !> Breaks up to now
+      !> Breaks so far
       real(wp), private :: breaks = 0.0_wp
       !> Time, displacement and contact force at the start of the present avalanche
       real(wp), private :: time = 0.0_wp, displacement = 0.0_wp, force = 0.0_wp
@@ -74,19 +73,17 @@ module mesoslip_recording_avalanches
       procedure, non_overridable :: count_others
       procedure, non_overridable :: close
       procedure, non_overridable :: begin_run
-      procedure, non_overridable :: report_failure
       procedure, non_overridable :: exchange
       procedure, non_overridable, private :: begin, take_snapshot
    end type avalanche_recorder_type
 
 contains
 
-   !> Make room for what will be recorded.
+   !> Set up empty tables.
    subroutine open(self, parameters, snapshot_time, contacts)
       class(avalanche_recorder_type), intent(inout) :: self
-!> Settings of the record
       type(avalanche_parameters_type), intent(in) :: parameters
-      !> Times at which snapshots are taken, growing [s]
+      !> Times at which snapshots are taken, increasing [s]
       real(wp), intent(in) :: snapshot_time(:)
       !> Number of contacts in a snapshot
       integer, intent(in) :: contacts
@@ -106,10 +103,9 @@ contains
       self%pausing_snapshots = max(1, pausing_numbers / max(1, snapshot_length * contacts))
    end subroutine open
 
-   !> Whether so much waits that it should be taken away.
+   !> Whether a table should be drained.
    pure function is_full(self)
       class(avalanche_recorder_type), intent(in) :: self
-      !> Whether it does
       logical :: is_full
 
       is_full = self%catalogue%count >= pausing_avalanches &
@@ -121,7 +117,7 @@ contains
       class(avalanche_recorder_type), intent(inout) :: self
       !> The slider after its advance
       class(slider_type), intent(in) :: slider
-      !> The contacts as they were during the advance
+      !> The contacts before their response
       class(contacts_type), intent(in) :: contacts
 
       type(motion_type) :: motion
@@ -135,7 +131,7 @@ contains
       end do
    end subroutine take_due_snapshots
 
-   !> Count the breaks of a response of the contacts; an avalanche begins unless there is one.
+   !> Count the breaks of a response of the contacts; an avalanche begins unless one has begun.
    subroutine count_breaks(self, slider, contacts, law)
       class(avalanche_recorder_type), intent(inout) :: self
       class(slider_type), intent(in) :: slider
@@ -150,10 +146,9 @@ contains
       self%breaks = contacts%breaks
    end subroutine count_breaks
 
-   !> Whether there is more to do than to count avalanches.
+   !> Whether more is recorded than the number of avalanches.
    pure function needs_each(self)
       class(avalanche_recorder_type), intent(in) :: self
-      !> Whether there is
       logical :: needs_each
 
       needs_each = self%parameters%min_size > 0.0_wp .or. self%parameters%snapshot_size > 0.0_wp &
@@ -164,23 +159,21 @@ contains
    !> Count avalanches of which nothing else is recorded.
    subroutine count_others(self, number, breaks)
       class(avalanche_recorder_type), intent(inout) :: self
-      !> Their number
       integer, intent(in) :: number
-      !> Breaks up to now
+      !> Breaks so far
       real(wp), intent(in) :: breaks
 
       self%avalanches = self%avalanches + number
       self%breaks = breaks
    end subroutine count_others
 
-   !> Begin another run, which has snapshots of its own.
+   !> Begin another run, with its own snapshots.
    pure subroutine begin_run(self)
       class(avalanche_recorder_type), intent(inout) :: self
 
       self%taken = 0
    end subroutine begin_run
 
-   !> An avalanche begins.
    subroutine begin(self, slider, law)
       class(avalanche_recorder_type), intent(inout) :: self
       class(slider_type), intent(in) :: slider
@@ -238,7 +231,7 @@ contains
 
    contains
 
-      !> Write a snapshot to where it is kept, as it may be long.
+      !> Write a snapshot, which may be long, into its row.
       subroutine write_snapshot(number, values)
          !> Number of contacts
          integer, intent(in) :: number
@@ -249,17 +242,6 @@ contains
       end subroutine write_snapshot
 
    end subroutine take_snapshot
-
-   !> Report that not all could be recorded.
-   subroutine report_failure(self, error)
-      class(avalanche_recorder_type), intent(in) :: self
-      !> Set if there was not enough memory
-      type(error_type), allocatable, intent(inout) :: error
-
-      call self%catalogue%report_failure(error)
-      call self%events%report_failure(error)
-      call self%snapshots%report_failure(error)
-   end subroutine report_failure
 
    !> Put the state into an archive or take it out.
    subroutine exchange(self, archive)

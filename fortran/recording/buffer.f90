@@ -1,4 +1,4 @@
-!> Rows that were recorded and wait to be taken away.
+!> Rows that were recorded, until they are drained.
 module mesoslip_recording_buffer
    use mesoslip_numerics_archive, only: archive_type
    use mesoslip_numerics_errors, only: error_type, raise, status_memory
@@ -12,7 +12,7 @@ module mesoslip_recording_buffer
    type :: buffer_type
       !> Rows are columns here, in the order of memory, shape (numbers in a row, room)
       real(wp), allocatable :: row(:, :)
-      !> Rows that wait
+      !> Number of rows
       integer :: count = 0
       !> Set when there is not enough memory for a row, which is then lost
       type(error_type), allocatable :: failure
@@ -20,7 +20,6 @@ module mesoslip_recording_buffer
       procedure, non_overridable :: open
       procedure, non_overridable :: reserve
       procedure, non_overridable :: has_room
-      procedure, non_overridable :: report_failure
       procedure, non_overridable :: add
       procedure, non_overridable :: drain
       procedure, non_overridable :: exchange
@@ -31,7 +30,7 @@ contains
    !> Set up an empty table.
    subroutine open(self, length, room)
       class(buffer_type), intent(inout) :: self
-      !> Numbers in a row, and rows for which there is room at first
+      !> Numbers in a row, and initial room for rows
       integer, intent(in) :: length, room
 
       integer :: stat
@@ -65,22 +64,11 @@ contains
    !> Whether there is room for one more row.
    pure function has_room(self)
       class(buffer_type), intent(in) :: self
-      !> Whether there is
       logical :: has_room
 
       has_room = self%count < size(self%row, 2)
    end function has_room
 
-   !> Report that rows were lost.
-   subroutine report_failure(self, error)
-      class(buffer_type), intent(in) :: self
-      !> Set if there was not enough memory for a row
-      type(error_type), allocatable, intent(inout) :: error
-
-      if (allocated(self%failure)) error = self%failure
-   end subroutine report_failure
-
-   !> Note that there is not enough memory.
    pure subroutine fail(self)
       class(buffer_type), intent(inout) :: self
 
@@ -99,10 +87,10 @@ contains
       self%row(:, self%count) = values
    end subroutine add
 
-   !> Take the first rows away.
+   !> Remove the first rows and return them.
    subroutine drain(self, values)
       class(buffer_type), intent(inout) :: self
-      !> As many rows as are to be taken, shape (numbers in a row, rows)
+      !> The rows, shape (numbers in a row, rows)
       real(wp), intent(out) :: values(:, :)
 
       integer :: row, left
@@ -115,7 +103,7 @@ contains
       self%count = left
    end subroutine drain
 
-   !> Put what waits into an archive or take it out.
+   !> Put the rows into an archive or take them out.
    subroutine exchange(self, name, archive)
       class(buffer_type), intent(inout) :: self
       character(len=*), intent(in) :: name

@@ -11,11 +11,9 @@ contains
 
    !> Motion where the velocity passed that of the drive, by bisection.
    pure function passage_of_drive(slider, direction) result(motion)
-      !> The slider after its advance
       class(slider_type), intent(in) :: slider
       !> Sign of the velocity of the drive
       real(wp), intent(in) :: direction
-      !> The motion
       type(motion_type) :: motion
 
       integer, parameter :: max_bisections = 50
@@ -39,7 +37,7 @@ contains
 
    contains
 
-      !> Whether a velocity at a time is that of a fall of the force.
+      !> Whether the force falls at a velocity.
       pure logical function is_faster(velocity, time)
          real(wp), intent(in) :: velocity, time
 
@@ -48,13 +46,10 @@ contains
 
    end function passage_of_drive
 
-   !> Maximum of the velocity in a direction, by golden section.
+   !> Maximum of the velocity in a direction, +1 or -1, by golden section [m/s].
    pure function max_velocity(slider, direction) result(velocity)
-      !> The slider after its advance
       class(slider_type), intent(in) :: slider
-      !> The direction, +1 or -1
       real(wp), intent(in) :: direction
-      !> The velocity [m/s]
       real(wp) :: velocity
 
       integer, parameter :: sections = 40

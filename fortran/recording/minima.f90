@@ -1,4 +1,4 @@
-!> Minima of the spring force, and how much of its rise since then is ringing.
+!> Minima of the spring force, and the part of its rise since then that is ringing.
 !>
 !> From a minimum to a maximum the drive moves by dX_d, the block by dX, and the force rises by
 !> K (dX_d - dX).
@@ -6,16 +6,15 @@
 !> - Ringing about smooth sliding, x = v t - A sin(w t), leads from a minimum to a maximum in half a
 !>   period. If the block never stops, A w < v, then dX > (1 - 2/pi) dX_d: all of the rise is
 !>   regained by ringing.
-!> - So it is if the block moves backwards, at a slow drive above all: dX < -dX_d/10.
+!> - The same holds if the block moves backwards, as at a slow drive: dX < -dX_d/10.
 !> - A block in between sticks, and is loaded by the drive. A quarter of the rise counts as ringing,
 !>   so that a slip gives back half of it.
-!> - A rise of less than a quarter of a period is ringing against contacts, all of it.
+!> - A rise of less than a quarter of a period is all ringing, against contacts.
 !>
-!> Where the drive becomes faster by u the force is at no minimum. The block comes up with the drive
-!> in a quarter of a wave, in which the force rises by K u/w: so much is ringing there.
+!> Where the drive becomes faster by u there is no minimum of the force. The block follows the drive
+!> in a quarter of a wave, in which the force rises by K u/w: this part is ringing.
 module mesoslip_recording_minima
    use mesoslip_numerics_archive, only: archive_type
-   use mesoslip_numerics_errors, only: error_type
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_recording_buffer, only: buffer_type
    use mesoslip_sliders_base, only: motion_type
@@ -37,34 +36,30 @@ module mesoslip_recording_minima
    real(wp), parameter :: max_sticking_ratio = 1.0_wp - 2.0_wp / pi, min_sticking_ratio = -0.1_wp
    !> Part of the rise that counts as ringing if the block sticks
    real(wp), parameter :: min_ringing_part = 0.25_wp
-   !> Rise of the force until the block has come up with the drive, over that without contacts
+   !> Maximum rise of the force until the block follows the drive, over that without contacts
    real(wp), parameter :: max_start_rise = 1.25_wp
 
-   !> Minima of the force, each above the one before: those that a later one went below are of no
-   !> more use.
+   !> Minima of the force, each above the one before: a lower one makes those before it useless.
    type :: minima_type
       !> Time [s]; force [N], displacements of the drive and of the block [m], velocity of the drive
       !> relative to the block [m/s], all times the direction of the drive
-      type(buffer_type), private :: rows
+      type(buffer_type) :: rows
    contains
       procedure, non_overridable :: open
       procedure, non_overridable :: clear
       procedure, non_overridable :: add
       procedure, non_overridable :: regained_force
-      procedure, non_overridable :: report_failure
       procedure, non_overridable :: exchange
    end type minima_type
 
 contains
 
-   !> Make room.
    subroutine open(self)
       class(minima_type), intent(inout) :: self
 
       call self%rows%open(row_length, initial_room)
    end subroutine open
 
-   !> Forget all minima.
    subroutine clear(self)
       class(minima_type), intent(inout) :: self
 
@@ -93,7 +88,7 @@ contains
          & direction * (motion%displacement + motion%base_displacement), lag])
    end subroutine add
 
-   !> Force that ringing has regained; forget the minima from which it cannot lead here.
+   !> Force that ringing has regained [N]; minima that are too old for ringing are deleted.
    function regained_force(self, motion, direction, half_period) result(regained)
       class(minima_type), intent(inout) :: self
       !> The motion at a maximum of the force
@@ -102,7 +97,6 @@ contains
       real(wp), intent(in) :: direction
       !> Half a period of the undamped setup [s]
       real(wp), intent(in) :: half_period
-      !> The force [N]
       real(wp) :: regained
 
       integer :: old, minimum
@@ -123,16 +117,11 @@ contains
       end do
    end function regained_force
 
-   !> The part of the rise of the force from a minimum to a maximum that is ringing.
+   !> The part of the rise of the force from a minimum to a maximum that is ringing [N].
    pure function ringing(minimum, motion, direction, half_period) result(part)
       real(wp), intent(in) :: minimum(row_length)
-      !> The motion at the maximum
       type(motion_type), intent(in) :: motion
-      !> Sign of the velocity of the drive
-      real(wp), intent(in) :: direction
-      !> Half a period of the undamped setup [s]
-      real(wp), intent(in) :: half_period
-      !> The part [N]
+      real(wp), intent(in) :: direction, half_period
       real(wp) :: part
 
       real(wp) :: drive, block, catching_up
@@ -145,15 +134,6 @@ contains
       catching_up = max_start_rise * minimum(row_lag) * half_period / pi
       part = part * min(1.0_wp, max(min_ringing_part, catching_up / (drive - block)))
    end function ringing
-
-   !> Report that not all could be recorded.
-   subroutine report_failure(self, error)
-      class(minima_type), intent(in) :: self
-      !> Set if there was not enough memory
-      type(error_type), allocatable, intent(inout) :: error
-
-      call self%rows%report_failure(error)
-   end subroutine report_failure
 
    !> Put the state into an archive or take it out.
    subroutine exchange(self, archive)

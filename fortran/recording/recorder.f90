@@ -1,8 +1,7 @@
-!> The record of a run: a trace at fixed intervals, a catalogue of slips, finer traces of them.
+!> The record of a run: a trace at fixed intervals, and slips with finer traces.
 module mesoslip_recording_recorder
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_numerics_archive, only: archive_type
-   use mesoslip_numerics_errors, only: error_type
    use mesoslip_recording_slips, only: slip_parameters_type, slip_recorder_type
    use mesoslip_recording_trace, only: max_samples_in_step, trace_type
    use mesoslip_sliders_base, only: slider_type
@@ -12,25 +11,19 @@ module mesoslip_recording_recorder
 
    public :: recorder_type, recorder_parameters_type
 
-!> Settings of the record.
+   !> Settings of the record.
    type :: recorder_parameters_type
-      !> Interval of the trace [s]
-      real(wp) :: interval = 1.0_wp
-      !> Time at which the run ends [s]
-      real(wp) :: duration = 0.0_wp
-      !> Layers whose displacements go with the trace
+      !> Interval of the trace, and time at which the run ends [s]
+      real(wp) :: interval = 1.0_wp, duration = 0.0_wp
+      !> Number of layers whose displacements are recorded with the trace
       integer :: layers = 0
-      !> Settings of the slip catalogue
       type(slip_parameters_type) :: slips
    end type recorder_parameters_type
 
-   !> Records a run into tables that the caller empties.
+   !> Records a run into tables that the caller drains.
    type :: recorder_type
-!> Settings of the record
       type(recorder_parameters_type) :: parameters
-      !> Samples at fixed intervals
       type(trace_type) :: trace
-      !> Slips and their traces
       type(slip_recorder_type) :: slips
    contains
       procedure, non_overridable :: open
@@ -38,16 +31,14 @@ module mesoslip_recording_recorder
       procedure, non_overridable :: max_step
       procedure, non_overridable :: record
       procedure, non_overridable :: step_filter
-      procedure, non_overridable :: report_failure
       procedure, non_overridable :: exchange
    end type recorder_type
 
 contains
 
-   !> Make room for what will be recorded.
+   !> Set up empty tables.
    subroutine open(self, parameters)
       class(recorder_type), intent(inout) :: self
-!> Settings of the record
       type(recorder_parameters_type), intent(in) :: parameters
 
       self%parameters = parameters
@@ -55,19 +46,17 @@ contains
       call self%slips%open(parameters%slips)
    end subroutine open
 
-   !> Whether so much waits that it should be taken away.
+   !> Whether a table should be drained.
    pure function is_full(self)
       class(recorder_type), intent(in) :: self
-      !> Whether it does
       logical :: is_full
 
       is_full = self%trace%is_full() .or. self%slips%is_full()
    end function is_full
 
-   !> Maximum time of an advance, so that not too many samples of either trace are within it.
+   !> Maximum duration of an advance [s], which bounds its samples in either trace.
    pure function max_step(self) result(time)
       class(recorder_type), intent(in) :: self
-      !> The time [s]
       real(wp) :: time
 
       time = self%parameters%interval
@@ -91,27 +80,16 @@ contains
       call self%slips%record(slider, detached, breaks)
    end subroutine record
 
-   !> The first step of a slider after which record would do more than take note of the velocity.
+   !> Filter for the first step after which record would do more than update the velocity.
    pure function step_filter(self, slider) result(filter)
       class(recorder_type), intent(in) :: self
       class(slider_type), intent(in) :: slider
-      !> The filter
       type(step_filter_type) :: filter
 
       filter%time = self%trace%next_time
       filter%reference = slider%drive%rate
       call self%slips%narrow(slider, filter)
    end function step_filter
-
-   !> Report that not all could be recorded.
-   subroutine report_failure(self, error)
-      class(recorder_type), intent(in) :: self
-      !> Set if there was not enough memory
-      type(error_type), allocatable, intent(inout) :: error
-
-      call self%trace%report_failure(error)
-      call self%slips%report_failure(error)
-   end subroutine report_failure
 
    !> Put the state into an archive or take it out.
    subroutine exchange(self, archive)

@@ -1,10 +1,9 @@
 !> Finer samples of the motion around slips.
 !>
-!> They are taken from the start of a fall of the force, which may come to no slip: then they are
-!> dropped. They go on until the block has been slow for half a period, or another slip starts.
+!> They are taken from the start of a fall of the force, and dropped if it does not become a slip.
+!> They continue until the block has been slow for half a period, or another slip starts.
 module mesoslip_recording_slip_trace
    use mesoslip_numerics_archive, only: archive_type
-   use mesoslip_numerics_errors, only: error_type
    use mesoslip_numerics_kinds, only: i8, wp
    use mesoslip_numerics_parameters, only: name_length
    use mesoslip_recording_buffer, only: buffer_type
@@ -16,20 +15,19 @@ module mesoslip_recording_slip_trace
 
    public :: slip_trace_type, slip_trace_columns
 
-   !> A sample has the number of the slip as well.
+   !> Columns of a sample: those of a trace, and the number of the slip
    character(len=*), parameter :: slip_trace_columns(*) = [character(len=name_length) :: &
       & trace_columns, "slip"]
    integer, parameter :: slip_trace_length = size(slip_trace_columns)
 
    !> Traces of slips.
    type :: slip_trace_type
-      !> Samples
       type(buffer_type) :: rows
       !> Time of the next sample [s]
       real(wp) :: next_time = huge(1.0_wp)
       !> Whether a trace is taken
       logical :: is_active = .false.
-      !> Interval of the samples [s], 0 for none
+      !> Interval of the samples [s]; 0: no samples
       real(wp), private :: interval = 0.0_wp
       !> Samples that will not be dropped
       integer, private :: kept_count = 0
@@ -51,38 +49,36 @@ module mesoslip_recording_slip_trace
       procedure, non_overridable :: drop_or_stop
       procedure, non_overridable :: keep
       procedure, non_overridable :: stop
-      procedure, non_overridable :: report_failure
       procedure, non_overridable :: exchange
    end type slip_trace_type
 
 contains
 
-   !> Make room for samples.
+   !> Set up an empty table.
    subroutine open(self, interval)
       class(slip_trace_type), intent(inout) :: self
-      !> Interval of the samples [s], 0 for none
+      !> Interval of the samples [s]; 0: no samples
       real(wp), intent(in) :: interval
 
       self%interval = interval
       call self%rows%open(slip_trace_length, pausing_samples + max_samples_in_step)
    end subroutine open
 
-   !> Samples that can be taken away: not those of a fall that may come to no slip.
+   !> Number of samples that can be drained: not those of a fall that may not become a slip.
    pure function final_samples(self, is_undecided) result(number)
       class(slip_trace_type), intent(in) :: self
       !> Whether there is such a fall
       logical, intent(in) :: is_undecided
-      !> Their number
       integer :: number
 
       number = self%rows%count
       if (is_undecided) number = self%kept_count
    end function final_samples
 
-   !> Take samples away.
+   !> Remove the first samples and return them.
    subroutine drain(self, values)
       class(slip_trace_type), intent(inout) :: self
-      !> As many samples as can be taken or fewer, shape (slip_trace_length, samples)
+      !> The samples, no more than can be drained, shape (slip_trace_length, samples)
       real(wp), intent(out) :: values(:, :)
 
       call self%rows%drain(values)
@@ -108,12 +104,12 @@ contains
       end do
    end subroutine take_samples
 
-   !> A fall of the force starts; a trace of the slip before goes on in the samples of the fall.
+   !> A fall of the force starts; a trace of the slip before continues in the samples of the fall.
    subroutine begin(self, time, slip)
       class(slip_trace_type), intent(inout) :: self
       !> Time of the start [s]
       real(wp), intent(in) :: time
-      !> Number of the slip that it may come to be
+      !> Number of the slip that it may become
       integer(i8), intent(in) :: slip
 
       if (.not. self%is_active) then
@@ -127,7 +123,7 @@ contains
       self%kept_count = self%rows%count
    end subroutine begin
 
-   !> The fall has come to a slip: its samples are of this one.
+   !> The fall is a slip, to which its samples belong.
    subroutine confirm(self, slip)
       class(slip_trace_type), intent(inout) :: self
       !> Number of the slip
@@ -138,14 +134,14 @@ contains
       self%rows%row(slip_trace_length, self%kept_count + 1:self%rows%count) = real(slip, wp)
    end subroutine confirm
 
-   !> The fall has come to no slip: its samples are those of the slip before, if any.
+   !> The fall is not a slip: its samples belong to the slip before, if any.
    subroutine drop(self)
       class(slip_trace_type), intent(inout) :: self
 
       if (.not. self%has_slip) self%rows%count = min(self%rows%count, self%kept_count)
    end subroutine drop
 
-   !> The fall has come to no slip: the trace goes on only after a slip.
+   !> The fall is not a slip: the trace continues only after a slip.
    subroutine drop_or_stop(self)
       class(slip_trace_type), intent(inout) :: self
 
@@ -153,7 +149,7 @@ contains
       if (.not. self%has_slip) call self%stop()
    end subroutine drop_or_stop
 
-   !> A slip is over; the trace goes on.
+   !> A slip is over; the trace continues.
    subroutine keep(self)
       class(slip_trace_type), intent(inout) :: self
 
@@ -168,15 +164,6 @@ contains
       self%has_slip = .false.
       self%next_time = huge(1.0_wp)
    end subroutine stop
-
-   !> Report that not all could be recorded.
-   subroutine report_failure(self, error)
-      class(slip_trace_type), intent(in) :: self
-      !> Set if there was not enough memory
-      type(error_type), allocatable, intent(inout) :: error
-
-      call self%rows%report_failure(error)
-   end subroutine report_failure
 
    !> Put the state into an archive or take it out.
    subroutine exchange(self, archive)

@@ -11,19 +11,16 @@
 !> - the block exceeds the drive's velocity by the slip velocity,
 !> - at least one contact breaks in it, or most are detached when it starts and have not broken in
 !>   the slip before: a film that breaks as a whole breaks just before the maximum, and
-!> - the force falls by more than twice what it had regained by ringing, so that the block travels
-!>   farther beyond what ringing gives back than it rings. Regained is the part of its rise that is
-!>   ringing (mesoslip_recording_minima), from a minimum in the last three quarters of a period of
-!>   the setup: contacts only make the block ring faster, so that ringing takes half a period, with
-!>   damping a little more; what takes longer is loading.
+!> - the force falls by more than twice the force regained by ringing: the part of the preceding
+!>   rise that is ringing (mesoslip_recording_minima), from a minimum in the last three quarters of
+!>   a period of the setup. Contacts only make the block ring faster, so that ringing takes half a
+!>   period, with damping a little more; a longer rise is loading.
 !>
-!> A slip starts at the maximum. It ends at the lowest minimum, after which no lower one comes
-!> within half a period, or before the force has regained half its drop and most contacts are
-!> pinned. A stage of the drive ends it too: the fall that a slower drive starts is none of the
-!> block's own.
+!> A slip starts at the maximum. It ends at the lowest minimum, if no lower one follows within half
+!> a period, or before the force has regained half its drop and most contacts are pinned. A stage of
+!> the drive ends it too: a fall of the force that a slower drive causes is not a slip.
 module mesoslip_recording_slips
    use mesoslip_numerics_archive, only: archive_type
-   use mesoslip_numerics_errors, only: error_type
    use mesoslip_numerics_kinds, only: i8, wp
    use mesoslip_numerics_parameters, only: name_length
    use mesoslip_recording_buffer, only: buffer_type
@@ -43,23 +40,23 @@ module mesoslip_recording_slips
       & "start_time", "end_time", "force_before", "force_after", "peak_velocity", &
       & "contacts_broken"]
    integer, parameter :: slip_length = size(slip_columns)
-   !> Waiting slips at which the run pauses to have them taken away
+   !> Number of slips at which the run pauses so that they are drained
    integer, parameter :: pausing_slips = 2000
 
-   !> A fall of the force makes a slip if it exceeds this many times what ringing regained.
+   !> Minimum fall of the force in a slip, over the force regained by ringing
    real(wp), parameter :: min_fall_ratio = 2.0_wp
-   !> Present state: neither fall nor slip, a fall that may come to be a slip, a slip
+   !> Present state: neither fall nor slip, a fall that may become a slip, a slip
    integer, parameter :: phase_slow = 0, phase_fall = 1, phase_slip = 2
 
-!> Settings of the record.
+   !> Settings of the record.
    type :: slip_parameters_type
-      !> Velocity above the drive's that makes a slip [m/s]; zero for no slips
+      !> Velocity above the drive's that makes a slip [m/s]; 0: no slips
       real(wp) :: slip_velocity = 0.0_wp
-      !> Half a period of the setup, or of what rings more slowly [s]
+      !> Half a period of the slowest ringing [s]
       real(wp) :: quiet_time = 0.0_wp
-      !> Interval of the traces of slips [s]; zero for none
+      !> Interval of the traces of slips [s]; 0: no traces
       real(wp) :: interval = 0.0_wp
-      !> Contacts in all
+      !> Number of contacts
       integer :: contacts = 0
    end type slip_parameters_type
 
@@ -92,7 +89,7 @@ module mesoslip_recording_slips
       !> Whether the block has been fast in the present fall, and the fall has had a minimum
       logical, private :: was_fast = .false., has_minimum = .false.
       !> Latest minima of the force
-      type(minima_type), private :: minima
+      type(minima_type) :: minima
    contains
       procedure, non_overridable :: open
       procedure, non_overridable :: is_full
@@ -101,7 +98,6 @@ module mesoslip_recording_slips
       procedure, non_overridable :: narrow
       procedure, non_overridable :: skip_steps
       procedure, non_overridable :: finish
-      procedure, non_overridable :: report_failure
       procedure, non_overridable :: exchange
       procedure, non_overridable, private :: change_stage, pass_maximum, pass_minimum
       procedure, non_overridable, private :: begin_fall, drop_fall, close_slip, update, update_peak
@@ -110,10 +106,9 @@ module mesoslip_recording_slips
 
 contains
 
-   !> Make room for what will be recorded.
+   !> Set up empty tables.
    subroutine open(self, parameters)
       class(slip_recorder_type), intent(inout) :: self
-!> Settings of the record
       type(slip_parameters_type), intent(in) :: parameters
 
       self%parameters = parameters
@@ -122,19 +117,17 @@ contains
       call self%minima%open()
    end subroutine open
 
-   !> Whether so much waits that it should be taken away.
+   !> Whether a table should be drained.
    pure function is_full(self)
       class(slip_recorder_type), intent(in) :: self
-      !> Whether it does
       logical :: is_full
 
       is_full = self%catalogue%count >= pausing_slips .or. self%final_samples() >= pausing_samples
    end function is_full
 
-   !> Samples of traces that can be taken away: not those of a fall that may come to no slip.
+   !> Number of samples that can be drained: not those of a fall that may not become a slip.
    pure function final_samples(self) result(number)
       class(slip_recorder_type), intent(in) :: self
-      !> Their number
       integer :: number
 
       number = self%trace%final_samples(self%phase == phase_fall)
@@ -169,11 +162,9 @@ contains
       if (self%trace%is_active) call self%update(slider, excess, detached)
    end subroutine record
 
-   !> Let a filter select the first step of a slider after which record would do more than take note
-   !> of the velocity.
-   !>
-   !> It is where the excess over the velocity of the drive leaves the interval, between 0 and the
-   !> slip velocity, in which it is, or where something is due.
+   !> Let a filter select the first step of a slider after which record would do more than update
+   !> the velocity: the excess over the velocity of the drive passes 0 or the slip velocity, or a
+   !> sample or the end of a trace is due.
    pure subroutine narrow(self, slider, filter)
       class(slip_recorder_type), intent(in) :: self
       class(slider_type), intent(in) :: slider
@@ -184,7 +175,7 @@ contains
       filter%direction = self%direction
       if (self%parameters%slip_velocity <= 0.0_wp) return
       if (self%drive_changes .or. slider%time <= 0.0_wp) then
-         ! The start of a stage is of interest in itself.
+         ! The start of a stage is recorded in any case.
          filter%time = -huge(1.0_wp)
          return
       end if
@@ -215,7 +206,7 @@ contains
       end if
    end subroutine narrow
 
-   !> Take note of steps of a slider that were of no interest.
+   !> Account for steps of a slider that were of no interest.
    subroutine skip_steps(self, filter)
       class(slip_recorder_type), intent(inout) :: self
       !> The filter after these steps
@@ -317,7 +308,7 @@ contains
       end if
    end subroutine pass_minimum
 
-   !> A fall of the force starts: it may come to be a slip.
+   !> A fall of the force starts: it may become a slip.
    subroutine begin_fall(self, motion, detached, breaks)
       class(slip_recorder_type), intent(inout) :: self
       !> The motion at the maximum of the force
@@ -341,7 +332,7 @@ contains
       call self%trace%begin(motion%time, self%count)
    end subroutine begin_fall
 
-   !> A fall of the force has come to no slip.
+   !> A fall of the force did not become a slip.
    subroutine drop_fall(self)
       class(slip_recorder_type), intent(inout) :: self
 
@@ -349,8 +340,8 @@ contains
       call self%trace%drop()
    end subroutine drop_fall
 
-   !> Contacts that broke up to the minimum: those that break in the fall, or if none does, those
-   !> that were detached when it started, if they were most; without those of the slip before.
+   !> Number of contacts that broke up to the minimum: in the fall, or just before it, if none broke
+   !> in it and most were detached when it started; without contacts of the slip before.
    pure function broken_contacts(self) result(number)
       class(slip_recorder_type), intent(in) :: self
       real(wp) :: number
@@ -374,7 +365,7 @@ contains
       call self%trace%keep()
    end subroutine close_slip
 
-   !> Bring a fall, a slip or the ringing after it to the end of the last advance of a slider.
+   !> Continue a fall, a slip or the ringing after it to the end of the last advance of a slider.
    subroutine update(self, slider, excess, detached)
       class(slip_recorder_type), intent(inout) :: self
       class(slider_type), intent(in) :: slider
@@ -395,7 +386,7 @@ contains
       if (self%was_fast) call self%update_peak(slider)
    end subroutine update
 
-   !> Take the velocity in the last advance of a slider into account in its maximum.
+   !> Update the maximum of the velocity by the last advance of a slider.
    subroutine update_peak(self, slider)
       class(slip_recorder_type), intent(inout) :: self
       class(slider_type), intent(in) :: slider
@@ -416,17 +407,6 @@ contains
       if (self%phase == phase_fall) call self%drop_fall()
       call self%trace%stop()
    end subroutine finish
-
-   !> Report that not all could be recorded.
-   subroutine report_failure(self, error)
-      class(slip_recorder_type), intent(in) :: self
-      !> Set if there was not enough memory
-      type(error_type), allocatable, intent(inout) :: error
-
-      call self%catalogue%report_failure(error)
-      call self%trace%report_failure(error)
-      call self%minima%report_failure(error)
-   end subroutine report_failure
 
    !> Put the state into an archive or take it out.
    subroutine exchange(self, archive)

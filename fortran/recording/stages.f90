@@ -1,11 +1,10 @@
-!> Results of the stages of a drive: where each started and ended, and the extremes and the mean
-!> of the drive's force in it.
+!> Results of the stages of a drive: start and end of each, with extremes and mean of the drive's
+!> force.
 !>
-!> All of it is exact from the motion. Sliders note the extremes of the force; the mean follows from
-!> the impulse of the drive.
+!> All are exact. Sliders note the extremes of the force; the mean follows from the impulse of the
+!> drive.
 module mesoslip_recording_stages
    use mesoslip_numerics_archive, only: archive_type
-   use mesoslip_numerics_errors, only: error_type
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_numerics_parameters, only: name_length
    use mesoslip_recording_buffer, only: buffer_type
@@ -23,7 +22,7 @@ module mesoslip_recording_stages
       & "max_force_displacement", "min_force", "min_force_time", &
       & "min_force_displacement", "mean_force"]
    integer, parameter :: stage_length = size(stage_columns)
-   !> Waiting stages at which the run pauses to have them taken away
+   !> Number of stages at which the run pauses so that they are drained
    integer, parameter :: pausing_stages = 2000
 
    !> Records the stages of a drive.
@@ -32,7 +31,7 @@ module mesoslip_recording_stages
       type(buffer_type) :: rows
       !> Number of the present stage
       integer, private :: number = 0
-      !> The motion at its start, and the velocity of the drive [m/s]
+      !> Motion and velocity of the drive at its start
       real(wp), private :: start_time = 0.0_wp, start_velocity = 0.0_wp, start_force = 0.0_wp, &
          & start_displacement = 0.0_wp, drive_start_displacement = 0.0_wp
    contains
@@ -40,23 +39,21 @@ module mesoslip_recording_stages
       procedure, non_overridable :: is_full
       procedure, non_overridable :: begin
       procedure, non_overridable :: finish
-      procedure, non_overridable :: report_failure
       procedure, non_overridable :: exchange
    end type stage_recorder_type
 
 contains
 
-   !> Make room.
+   !> Set up an empty table.
    subroutine open(self)
       class(stage_recorder_type), intent(inout) :: self
 
       call self%rows%open(stage_length, 1)
    end subroutine open
 
-   !> Whether so much waits that it should be taken away.
+   !> Whether the table should be drained.
    pure function is_full(self)
       class(stage_recorder_type), intent(in) :: self
-      !> Whether it does
       logical :: is_full
 
       is_full = self%rows%count >= pausing_stages
@@ -106,15 +103,6 @@ contains
             & extremes%min_displacement, mean])
       end associate
    end subroutine finish
-
-   !> Report that not all could be recorded.
-   subroutine report_failure(self, error)
-      class(stage_recorder_type), intent(in) :: self
-      !> Set if there was not enough memory
-      type(error_type), allocatable, intent(inout) :: error
-
-      call self%rows%report_failure(error)
-   end subroutine report_failure
 
    !> Put the state into an archive or take it out.
    subroutine exchange(self, archive)

@@ -1,10 +1,11 @@
-!> Whether a motion has come to a steady state, from means of the drive's force over blocks.
+!> Whether a motion is steady, from means of the drive's force over blocks.
 !>
-!> Each block is an equal distance of the drive at a constant velocity. The state is steady as soon
-!> as the mean of the last blocks and that of as many before agree within the standard error of
-!> their difference, by the scatter of the last ones, or within a tolerance, and those before do
-!> not scatter twice as much. A force that drifts does not pass: where it changes evenly over
-!> twice n blocks, the difference is some sqrt(6 n) standard errors; nor does what dies away fast.
+!> Each block is an equal distance of the drive at a constant velocity. Two means are compared, over
+!> the last n blocks and the n blocks before. The state is steady as soon as they agree within the
+!> standard error of their difference, by the scatter of the last blocks, or within a tolerance, and
+!> the blocks before do not scatter twice as much. A force that drifts is not steady: where it
+!> changes evenly over twice n blocks, the difference is some sqrt(6 n) standard errors. Nor is a
+!> change that decays fast.
 module mesoslip_recording_steady
    use mesoslip_numerics_archive, only: archive_type
    use mesoslip_numerics_kinds, only: wp
@@ -15,13 +16,13 @@ module mesoslip_recording_steady
 
    !> Means over the latest blocks.
    type :: steady_recorder_type
-      !> Distance of the drive in a block [m], 0 for no steady state to look for
+      !> Distance of the drive in a block [m]; 0: no steady state is looked for
       real(wp) :: distance = 0.0_wp
-      !> Blocks of which the mean is taken, two at least
+      !> Number of blocks in a mean, at least 2
       integer :: blocks = 2
-      !> Difference that counts as none [N]
+      !> Difference of means that is ignored [N]
       real(wp) :: tolerance = 0.0_wp
-      !> Time at which the present block ends [s]; huge if there is none
+      !> Time at which the present block ends [s]; huge if no steady state is looked for
       real(wp) :: block_end = huge(1.0_wp)
 
       !> Time at which the first block began [s], blocks that are over, and time of one [s]
@@ -41,14 +42,11 @@ module mesoslip_recording_steady
 
 contains
 
-   !> Set what to look for.
+   !> Set the parameters, as in the type.
    subroutine open(self, distance, blocks, tolerance)
       class(steady_recorder_type), intent(inout) :: self
-      !> Distance of the drive in a block [m], 0 for nothing to look for
       real(wp), intent(in) :: distance
-      !> Blocks of which the mean is taken, two at least
       integer, intent(in) :: blocks
-      !> Difference that counts as none [N]
       real(wp), intent(in) :: tolerance
 
       self%distance = distance
@@ -61,10 +59,9 @@ contains
       end if
    end subroutine open
 
-   !> Whether it is set what to look for.
+   !> Whether the parameters are set.
    pure function is_open(self)
       class(steady_recorder_type), intent(in) :: self
-      !> Whether it is
       logical :: is_open
 
       is_open = allocated(self%mean)
@@ -90,7 +87,6 @@ contains
       class(steady_recorder_type), intent(inout) :: self
       !> Impulse of the drive in the stage so far [N s]
       real(wp), intent(in) :: impulse
-      !> Whether it is
       logical, intent(out) :: is_steady
 
       real(wp) :: late, early, scatter, scatter_before

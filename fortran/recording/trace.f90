@@ -1,9 +1,8 @@
 !> Samples of the motion at fixed intervals.
 !>
-!> They are taken from the motion between events, so the interval does not change a run.
+!> They are taken from the motion between events, so that the interval does not change a run.
 module mesoslip_recording_trace
    use mesoslip_numerics_archive, only: archive_type
-   use mesoslip_numerics_errors, only: error_type
    use mesoslip_numerics_kinds, only: i8, wp
    use mesoslip_numerics_parameters, only: name_length
    use mesoslip_recording_buffer, only: buffer_type
@@ -19,12 +18,12 @@ module mesoslip_recording_trace
       & "drive_displacement", "displacement", "velocity", "spring_force", "contact_force", &
       & "detached_contacts", "elastic_force", "base_displacement"]
    integer, parameter :: trace_length = size(trace_columns)
-   !> Steps must be shorter than this many samples.
+   !> Maximum number of samples in a step
    integer, parameter :: max_samples_in_step = 1000
-   !> Waiting samples at which the run pauses to have them taken away
+   !> Number of samples at which the run pauses so that they are drained
    integer, parameter :: pausing_samples = 20000
 
-   !> Part of an interval within which two times are equal
+   !> Share of an interval within which two times are equal
    real(wp), parameter :: time_tolerance = 1.0e-6_wp
 
    !> A trace of a run.
@@ -46,13 +45,12 @@ module mesoslip_recording_trace
       procedure, non_overridable :: begin
       procedure, non_overridable :: is_full
       procedure, non_overridable :: take_samples
-      procedure, non_overridable :: report_failure
       procedure, non_overridable :: exchange
    end type trace_type
 
 contains
 
-   !> Make room for samples.
+   !> Set up empty tables.
    subroutine open(self, interval, duration, layers)
       class(trace_type), intent(inout) :: self
       !> Interval of the samples, and time at which the run ends [s]
@@ -67,7 +65,7 @@ contains
       call self%layer_rows%open(layers, pausing_samples + max_samples_in_step)
    end subroutine open
 
-   !> Begin another run with a sample. The samples of the earlier run go on if this is one of them.
+   !> Begin another run with a sample. Samples of the earlier run continue if this is one of them.
    pure subroutine begin(self, time)
       class(trace_type), intent(inout) :: self
       !> Time of the sample [s]
@@ -82,10 +80,9 @@ contains
       self%next_time = time
    end subroutine begin
 
-   !> Whether so many samples wait that they should be taken away.
+   !> Whether the table should be drained.
    pure function is_full(self)
       class(trace_type), intent(in) :: self
-      !> Whether it does
       logical :: is_full
 
       is_full = self%rows%count >= pausing_samples
@@ -111,7 +108,7 @@ contains
          end if
          self%samples = self%samples + 1
          self%next_time = self%first_time + real(self%samples, wp) * self%interval
-         ! The end of the run is a sample if rounding alone keeps it from being one.
+         ! The end of the run is a sample, but for rounding.
          if (abs(self%next_time - self%duration) <= self%interval * time_tolerance) then
             self%next_time = self%duration
          end if
@@ -123,23 +120,12 @@ contains
       type(motion_type), intent(in) :: motion
       !> Detached contacts
       real(wp), intent(in) :: detached
-      !> The sample
       real(wp) :: sample(trace_length)
 
       sample = [motion%time, motion%drive_displacement, motion%displacement, motion%velocity, &
          & motion%spring_force, motion%contact_force, detached, &
          & motion%elastic_force, motion%base_displacement]
    end function sample_of
-
-   !> Report that not all could be recorded.
-   subroutine report_failure(self, error)
-      class(trace_type), intent(in) :: self
-      !> Set if there was not enough memory
-      type(error_type), allocatable, intent(inout) :: error
-
-      call self%rows%report_failure(error)
-      call self%layer_rows%report_failure(error)
-   end subroutine report_failure
 
    !> Put the state into an archive or take it out.
    subroutine exchange(self, archive)

@@ -17,10 +17,9 @@ module mesoslip_sliders_layered
    use mesoslip_sliders_base, only: exchange_law, exchange_slider, motion_type, shift_slider, &
       & slider_type
    use mesoslip_sliders_hazard_clock, only: advance_clocks, limit_window
-   use mesoslip_sliders_layered_expansion, only: expand, sum_series
    use mesoslip_sliders_layered_integrator, only: integrator_type
-   use mesoslip_sliders_layered_system, only: fastest_rate, layered_parameters_type, new_system, &
-      & solver_codes, solver_names, solver_series, system_type
+   use mesoslip_sliders_layered_system, only: expand, fastest_rate, layered_parameters_type, &
+      & new_system, solver_codes, solver_names, solver_series, sum_series, system_type
    use mesoslip_sliders_motion_series, only: first_end, horner, inverse, max_terms, slope
    implicit none
    private

@@ -1,4 +1,4 @@
-!> Lives of contacts under a slider that moves forward: how they break, and what the rest bears.
+!> Lives of contacts under a slider that moves forward: their breaks, and the force of the pinned.
 !>
 !> Dimensionless as in mesoslip_contacts_mechanics, for one contact. A newborn contact is followed
 !> from its attaching, a contact of the first generation from the start of the motion.
@@ -17,7 +17,7 @@ module mesoslip_theory_lives
    implicit none
    private
 
-   public :: contact_lives_type, new_contact_lives, make_contact_lives
+   public :: contact_lives_type, make_contact_lives
    public :: scale_names
 
    !> Scales of the lives: shortest, longest and mean life of newborns; their stiffness and force at
@@ -32,8 +32,8 @@ module mesoslip_theory_lives
    integer, parameter :: zero = 1, half = 2, one = 3, three_halves = 4, two = 5, minus_half = 6, &
       & minus_one = 7
 
-   !> Pieces of the range of a newborn's stretch, and of that of the law, and points in each, of the
-   !> rule by which the stretch is averaged; half the range in standard deviations
+   !> Rule for averages over a newborn's stretch: pieces of its range and of the law's, points in
+   !> each; half the range in standard deviations
    integer, parameter :: pieces = 9, law_pieces = 12, points = 12
    real(wp), parameter :: reach = 9.0_wp
 
@@ -58,7 +58,7 @@ module mesoslip_theory_lives
       real(wp) :: steady_force = 0.0_wp, mean_mass = 1.0_wp
 
       type(partial_moments_type), private :: moments
-      !> Of contacts with the stiffnesses of a table
+      !> Lives of contacts with the stiffnesses of a table
       type(table_lives_type), private :: table
       !> Longest and shortest lives of contacts that attach with no spread
       real(wp), private :: sharp_longest = 0.0_wp, sharp_shortest = 0.0_wp
@@ -87,46 +87,48 @@ module mesoslip_theory_lives
 
 contains
 
-   !> Set up contacts.
-   subroutine new_contact_lives(self, law, coupling, back_force, newborn_width, reattach, initial)
+   !> Set up the lives of contacts from named numbers.
+   subroutine make_contact_lives(self, parameters, error)
       type(contact_lives_type), intent(out) :: self
-      !> Law of the thresholds, all above the back force
-      class(threshold_law_type), intent(in) :: law
-      !> One of the coupling_ codes
-      integer, intent(in) :: coupling
-      !> Force at attaching, f_b/f_s; standard deviation of the stretch there
-      real(wp), intent(in) :: back_force, newborn_width
-      !> Whether a broken contact attaches again
-      logical, intent(in) :: reattach
-      !> One of the initial_ codes
-      integer, intent(in) :: initial
+      !> Law, coupling and initial state; relative width, back force and spread of the
+      !> stretch of newborns; whether contacts attach again
+      type(parameters_type), intent(inout) :: parameters
+      !> Set if a number is missing or superfluous, or the law does not exist
+      type(error_type), allocatable, intent(out) :: error
 
+      character(len=name_length) :: law
       real(wp) :: state(3), stretching
+      logical :: reattach
 
-      allocate (self%law, source=law)
-      self%coupling = coupling
-      self%back_force = back_force
-      self%newborn_width = newborn_width
-      self%initial = initial
+      call parameters%take("threshold_law", law, error)
+      call parameters%take("coupling", coupling_names, self%coupling, error)
+      call parameters%take("back_force_ratio", self%back_force, error)
+      call parameters%take("newborn_width", self%newborn_width, error)
+      call parameters%take("reattach", reattach, error)
+      call parameters%take("initial", initial_names, self%initial, error)
+      if (allocated(error)) return
+      call make_threshold_law(self%law, law, parameters, self%back_force, error)
+      call parameters%finish(error)
+      if (allocated(error)) return
       call gauss_legendre(self%point, self%weight)
-      if (coupling == coupling_table) then
+      if (self%coupling == coupling_table) then
          call take_table(self, stretching)
       else
          call take_moments(self, stretching)
       end if
-      self%shortest = max(0.0_wp, self%sharp_shortest - reach * newborn_width)
-      self%longest = self%sharp_longest + reach * newborn_width
-      if (newborn_width > 0.0_wp) then
+      self%shortest = max(0.0_wp, self%sharp_shortest - reach * self%newborn_width)
+      self%longest = self%sharp_longest + reach * self%newborn_width
+      if (self%newborn_width > 0.0_wp) then
          state = averaged(self, sharp_state, 0.0_wp)
          self%acceptance = state(1)
+         call integrate_life(self, self%mean_life, stretching)
       end if
-      if (newborn_width > 0.0_wp) call integrate_life(self, self%mean_life, stretching)
       self%reattach = reattach
       state = self%newborn_state(0.0_wp)
       self%newborn_stiffness = state(2)
       self%newborn_force = state(3)
       if (reattach) self%steady_force = stretching / self%mean_life
-   end subroutine new_contact_lives
+   end subroutine make_contact_lives
 
    !> Moments and scales of lives of contacts without spread.
    subroutine take_moments(self, stretching)
@@ -182,42 +184,12 @@ contains
       !> Length of the window
       real(wp), intent(in) :: window
 
-      call self%table%spread(window)
+      self%table%window = window
    end subroutine spread_table
 
-   !> Set up the lives of contacts from named numbers.
-   subroutine make_contact_lives(self, parameters, error)
-      type(contact_lives_type), intent(out) :: self
-      !> Law, coupling and initial state; relative width, back force and spread of the
-      !> stretch of newborns; whether contacts attach again
-      type(parameters_type), intent(inout) :: parameters
-      !> Set if a number is missing or superfluous, or the law does not exist
-      type(error_type), allocatable, intent(out) :: error
-
-      class(threshold_law_type), allocatable :: threshold_law
-      character(len=name_length) :: law
-      integer :: coupling, initial
-      real(wp) :: back_force, newborn_width
-      logical :: reattach
-
-      call parameters%take("threshold_law", law, error)
-      call parameters%take("coupling", coupling_names, coupling, error)
-      call parameters%take("back_force_ratio", back_force, error)
-      call parameters%take("newborn_width", newborn_width, error)
-      call parameters%take("reattach", reattach, error)
-      call parameters%take("initial", initial_names, initial, error)
-      if (allocated(error)) return
-      call make_threshold_law(threshold_law, law, parameters, back_force, error)
-      call parameters%finish(error)
-      if (allocated(error)) return
-      call new_contact_lives(self, threshold_law, coupling, back_force, newborn_width, reattach, &
-         & initial)
-   end subroutine make_contact_lives
-
-   !> Scales of the lives.
+   !> Scales of the lives, in the order of scale_names.
    pure function scales(self)
       class(contact_lives_type), intent(in) :: self
-      !> Scales in the order of scale_names
       real(wp) :: scales(size(scale_names))
 
       scales = [self%shortest, self%longest, self%mean_life, self%newborn_stiffness, &
@@ -228,7 +200,7 @@ contains
    !> Integrals of the newborns' state over their lives.
    subroutine integrate_life(self, mean_life, stretching)
       type(contact_lives_type), intent(in) :: self
-      !> Integral of the part that is pinned, and of the force
+      !> Integrals of the pinned share, and of the force
       real(wp), intent(out) :: mean_life, stretching
 
       integer, parameter :: max_cells = 2000
@@ -237,7 +209,7 @@ contains
 
       mean_life = 0.0_wp
       stretching = 0.0_wp
-      ! The spread of the stretch smooths what is left over its standard deviation.
+      ! The spread of the stretch smooths the state over its standard deviation.
       cells = ceiling(min(real(max_cells, wp), 0.5_wp * self%longest / self%newborn_width))
       length = self%longest / cells
       do cell = 0, cells - 1
@@ -249,12 +221,12 @@ contains
       end do
    end subroutine integrate_life
 
-   !> Breaks of newborns over displacement.
+   !> Breaks of newborns over displacement: density of breaks, of the force released by them, and of
+   !> the stiffness lost.
    pure function newborn_rates(self, life) result(rates)
       class(contact_lives_type), intent(in) :: self
-      !> Displacement since the attaching
+      !> Displacement since attaching
       real(wp), intent(in) :: life
-      !> Density of breaks, of the force released by them, and of the stiffness lost
       real(wp) :: rates(3)
 
       rates = 0.0_wp
@@ -266,12 +238,11 @@ contains
       end if
    end function newborn_rates
 
-   !> Survival of newborns.
+   !> Survival of newborns: pinned share, its stiffness and force.
    pure function newborn_state(self, life) result(state)
       class(contact_lives_type), intent(in) :: self
-      !> Displacement since the attaching
+      !> Displacement since attaching
       real(wp), intent(in) :: life
-      !> Part that is pinned, its stiffness and force
       real(wp) :: state(3)
 
       if (.not. self%reattach) then
@@ -289,11 +260,11 @@ contains
       real(wp), intent(in) :: life
       real(wp) :: rates(3)
 
-      real(wp) :: threshold, density
+      real(wp) :: threshold, density, state(3)
 
       rates = 0.0_wp
       if (self%coupling == coupling_table) then
-         if (life > 0.0_wp) rates = self%table%newborn_rates(life)
+         if (life > 0.0_wp) call self%table%newborn_at(life, state, rates)
          return
       end if
       if (life < self%sharp_shortest .or. life > self%sharp_longest) return
@@ -309,10 +280,10 @@ contains
       real(wp), intent(in) :: life
       real(wp) :: state(3)
 
-      real(wp) :: moment(size(exponents))
+      real(wp) :: moment(size(exponents)), rates(3)
 
       if (self%coupling == coupling_table) then
-         state = self%table%newborn_state(life)
+         call self%table%newborn_at(life, state, rates)
          return
       end if
       moment = self%moments%above(broken_threshold(self%coupling, self%back_force, life))
@@ -333,7 +304,7 @@ contains
       real(wp) :: edge(pieces + law_pieces + 2), swap, length, z, first, last
       integer :: piece, other, node
 
-      ! Pieces end where the function is not smooth, and are short beside the law as well.
+      ! Pieces end where the function is not smooth, and are short compared with the law.
       do piece = 1, pieces + 1
          edge(piece) = reach * (2.0_wp * (piece - 1) / pieces - 1.0_wp)
       end do
@@ -364,26 +335,18 @@ contains
       end do
    end function averaged
 
-   !> Breaks of the first generation over displacement.
+   !> The same rates of the first generation, after a displacement since the start.
    pure function first_rates(self, displacement) result(rates)
       class(contact_lives_type), intent(in) :: self
-      !> Displacement since the start
       real(wp), intent(in) :: displacement
-      !> Density of breaks, of the force released by them, and of the stiffness lost
       real(wp) :: rates(3)
 
-      real(wp) :: threshold, density, moment(size(exponents)), back
+      real(wp) :: threshold, density, moment(size(exponents)), back, state(3)
 
       rates = 0.0_wp
       if (self%coupling == coupling_table) then
-         select case (self%initial)
-         case (initial_steady)
-            rates = self%table%steady_rates(max(0.0_wp, displacement))
-         case (initial_uniform)
-            rates = self%table%uniform_rates(max(0.0_wp, displacement))
-         case default
-            rates = self%table%relaxed_rates(displacement)
-         end select
+         call self%table%first_at(self%initial, merge(displacement, max(0.0_wp, displacement), &
+            & self%initial == initial_relaxed), state, rates)
          return
       end if
       back = 0.0_wp
@@ -408,25 +371,16 @@ contains
       end if
    end function first_rates
 
-   !> Survival of the first generation.
+   !> The same state of the first generation, after a displacement since the start.
    pure function first_state(self, displacement) result(state)
       class(contact_lives_type), intent(in) :: self
-      !> Displacement since the start
       real(wp), intent(in) :: displacement
-      !> Part that is pinned, its stiffness and force
       real(wp) :: state(3)
 
-      real(wp) :: m(size(exponents)), x, b, threshold
+      real(wp) :: m(size(exponents)), x, b, threshold, rates(3)
 
       if (self%coupling == coupling_table) then
-         select case (self%initial)
-         case (initial_steady)
-            state = self%table%steady_state(displacement)
-         case (initial_uniform)
-            state = self%table%uniform_state(displacement)
-         case default
-            state = self%table%relaxed_state(displacement)
-         end select
+         call self%table%first_at(self%initial, displacement, state, rates)
          return
       end if
       x = displacement
@@ -439,7 +393,7 @@ contains
       m = self%moments%above(threshold)
       select case (self%initial)
       case (initial_steady)
-         ! Of a contact that lives l, the part 1 - x/l is left, its stretch uniform above x_b + x.
+         ! Of a life l the share 1 - x/l remains, with stretches uniform above x_b + x.
          if (self%coupling == coupling_equal) then
             state(1) = m(one) - (b + x) * m(zero)
             state(2) = state(1)
@@ -452,7 +406,7 @@ contains
          end if
          state = state / self%mean_life
       case (initial_uniform)
-         ! Of a contact that breaks at x_s, the part 1 - x/x_s is left, uniform above x.
+         ! The share 1 - x/x_s remains, with stretches uniform above x.
          if (self%coupling == coupling_equal) then
             state(1) = m(zero) - x * m(minus_one)
             state(2) = state(1)

@@ -36,23 +36,21 @@ module mesoslip_theory_onset
 
 contains
 
-   !> Integrate an equation until it ends: S46 where its expansion does, S47 at the least spring
-   !> force, where the slider is as slow as the drive again.
+   !> Integrate an equation until it ends: S46 where its expansion does, S47 at the minimum of the
+   !> spring force, where the slider is as slow as the drive again.
    subroutine integrate_onset(onset, interval, tolerance, samples, count, ended, error)
-      !> The equation
       type(onset_type), intent(in), target :: onset
       !> Interval of the samples, and relative tolerance of the integration
       real(wp), intent(in) :: interval, tolerance
       !> Samples, the last one at the end, shape (numbers in a sample, capacity)
       real(wp), intent(out) :: samples(:, :)
-      !> Number of samples
       integer, intent(out) :: count
-      !> Whether it came to its end, rather than to the last sample there is room for
+      !> Whether the end was reached before the last sample
       logical, intent(out) :: ended
       !> Set if the integration fails
       type(error_type), allocatable, intent(out) :: error
 
-      ! Displacements are of order D1 at the start and 1 in the end.
+      ! Displacements are of order D1 at the start and 1 at the end.
       real(wp), parameter :: least = 1.0e-3_wp
       type(cvode_type) :: cvode
       real(c_double), target :: state(3)
@@ -98,7 +96,7 @@ contains
       status = 0
    end function rates
 
-   !> Zero where an equation ends.
+   !> Zero at the end of an equation.
    function distance_to_end(time, size, state, data) bind(c, name="mesoslip_onset_end") &
       & result(value)
       real(c_double), value :: time

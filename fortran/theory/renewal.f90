@@ -16,24 +16,23 @@ module mesoslip_theory_renewal
 
    public :: renewal_solution_type, solve_renewal
 
-   !> Breaks, and what the contacts bear, on panels of the displacement.
+   !> Breaks, and the force of the contacts, on panels of the displacement.
    type :: renewal_solution_type
       !> Points within a panel, shape (points)
       real(wp), allocatable :: point(:)
       !> Breaks over displacement Gamma, slope F' of the force, force F and stiffness K_c at the
       !> points, shape (points, panels)
       real(wp), allocatable :: breaks(:, :), slope(:, :), force(:, :), stiffness(:, :)
-      !> Part of the contacts that is pinned, at the edges of the panels, shape (panels + 1)
+      !> Share of pinned contacts at the edges of the panels, shape (panels + 1)
       real(wp), allocatable :: pinned(:)
-      !> Largest difference of the force at the end of a panel when integrated from its start
+      !> Maximum difference of the force at the end of a panel when integrated from its start
       real(wp) :: mismatch = 0.0_wp
    end type renewal_solution_type
 
 contains
 
-   !> Solve the renewal equation from a displacement on.
+   !> Solve the renewal equation.
    subroutine solve_renewal(lives, start, width, panels, points, solution)
-      !> The contacts
       type(contact_lives_type), intent(in) :: lives
       !> Start of the first panel, at or below the start of the motion at 0; width of the panels
       real(wp), intent(in) :: start, width
@@ -84,7 +83,7 @@ contains
       solution%breaks = released(:, :, 1)
    end subroutine solve_renewal
 
-   !> Integrals of the kernels over the Lagrange polynomials of a panel that lies some panels back.
+   !> Integrals of the kernels over the Lagrange polynomials of earlier panels, by their lag.
    subroutine kernel_blocks(lives, width, panels, point, kinds, kernel, first, last)
       type(contact_lives_type), intent(in) :: lives
       real(wp), intent(in) :: width
@@ -133,7 +132,7 @@ contains
       end do
    end subroutine kernel_blocks
 
-   !> Force on the contacts: at the edges of the panels from all that attached, between by rates.
+   !> Force on the contacts: at the edges of panels from all that attached, between by rates.
    subroutine bear(lives, start, width, weight, released, solution)
       type(contact_lives_type), intent(in) :: lives
       real(wp), intent(in) :: start, width
@@ -151,7 +150,7 @@ contains
       panels = size(released, 2)
       matrix = width * integration_matrix(solution%point)
       lags = min(panels, int(lives%longest / width) + 2)
-      ! Of those that attached so many panels back, or fewer, none has broken.
+      ! Contacts that attached in the last young panels are all pinned.
       young = min(lags, int(lives%shortest / width))
       allocate (left(points, 3, young + 1:lags))
       do lag = young + 1, lags
@@ -163,7 +162,7 @@ contains
 
       allocate (solution%slope(points, panels), solution%force(points, panels))
       allocate (solution%stiffness(points, panels), solution%pinned(panels + 1))
-      ! Number and sum of ages of the young ones.
+      ! Number of these contacts, and sum of their ages.
       whole = 0.0_wp
       age = 0.0_wp
       do panel = 1, panels + 1
@@ -197,7 +196,7 @@ contains
 
    contains
 
-      !> Count those that attached some panels back among the young, or take them out.
+      !> Add the contacts that attached some panels back to the young ones, or remove them.
       subroutine count_young(lag, sign_of_change)
          integer, intent(in) :: lag
          real(wp), intent(in) :: sign_of_change

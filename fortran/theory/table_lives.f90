@@ -5,10 +5,11 @@
 !>
 !> The density of breaks of a table is as rough as the gaps between its samples. To solve an
 !> integral equation each life is spread evenly over a window: rates and states are those of such
-!> contacts to rounding, so that none is lost, and averages differ from those of the table by the
-!> window squared.
+!> contacts to rounding, so that no contact is lost, and averages differ from those of the table by
+!> the window squared.
 module mesoslip_theory_table_lives
    use mesoslip_contacts_life_moments, only: life_moments_type, new_life_moments
+   use mesoslip_contacts_mechanics, only: initial_steady, initial_uniform
    use mesoslip_contacts_stretch_cells, only: stretch_cells_type
    use mesoslip_numerics_kinds, only: wp
    implicit none
@@ -30,22 +31,15 @@ module mesoslip_theory_table_lives
       real(wp) :: mean_life = 0.0_wp, stretching = 0.0_wp, mean_mass = 1.0_wp
       real(wp) :: shortest = 0.0_wp, longest = 0.0_wp
       real(wp) :: first_shortest = 0.0_wp, first_longest = 0.0_wp
+      !> Window over which a life is spread; it does not begin before 0
+      real(wp) :: window = 0.0_wp
       !> Force at attaching, f_b/f_s
       real(wp), private :: back_force = 0.0_wp
-      !> Window over which a life is spread; 0 for none
-      real(wp), private :: window = 0.0_wp
       !> Moments of newborns, and of contacts that attached with no force
       type(life_moments_type), private :: newborn, unforced
    contains
-      procedure, non_overridable :: spread
-      procedure, non_overridable :: newborn_rates
-      procedure, non_overridable :: newborn_state
-      procedure, non_overridable :: relaxed_rates
-      procedure, non_overridable :: relaxed_state
-      procedure, non_overridable :: steady_rates
-      procedure, non_overridable :: steady_state
-      procedure, non_overridable :: uniform_rates
-      procedure, non_overridable :: uniform_state
+      procedure, non_overridable :: newborn_at
+      procedure, non_overridable :: first_at
    end type table_lives_type
 
 contains
@@ -63,7 +57,7 @@ contains
       real(wp) :: all(orders)
 
       self%back_force = back_force
-      ! The shortest life may be 0, over which nobody asks for averages.
+      ! Newborns need no moments with 1/l: their shortest life may be 0.
       call new_life_moments(self%newborn, cells, back_force, stiffness_power(:k_squared), &
          & life_power(:k_squared))
       call new_life_moments(self%unforced, cells, 0.0_wp, stiffness_power, life_power)
@@ -78,22 +72,13 @@ contains
       self%mean_mass = all(k_squared) / mean_square
    end subroutine new_table_lives
 
-   !> Spread lives over a window.
-   pure subroutine spread(self, window)
-      class(table_lives_type), intent(inout) :: self
-      !> Length of the window; that around a life does not begin before 0
-      real(wp), intent(in) :: window
-
-      self%window = window
-   end subroutine spread
-
    !> Survival of contacts that attached together, and their breaks over displacement.
    pure subroutine follow(moments, force, window, displacement, state, rates)
       type(life_moments_type), intent(in) :: moments
-      !> Force at attaching, window of a life, displacement since
+      !> Force at attaching, window of a life, displacement since attaching
       real(wp), intent(in) :: force, window, displacement
-      !> Part that is pinned, its stiffness and force; density of breaks, of the force released by
-      !> them, and of the stiffness lost
+      !> Pinned share, its stiffness and force; density of breaks, of the force released by them,
+      !> and of the stiffness lost
       real(wp), intent(out) :: state(3), rates(3)
 
       real(wp) :: half, low(moments%orders), high(moments%orders), pinned(2), broken(2)
@@ -102,7 +87,7 @@ contains
       call moments%above(displacement - half, low)
       if (half > 0.0_wp) then
          call moments%above(displacement + half, high)
-         ! Means over the window of what is left, from integrals E[(l - x) k^a; l > x].
+         ! Means of the pinned share over the window, from integrals E[(l - x) k^a; l > x].
          pinned = ((low([l, k_l]) - (displacement - half) * low([one, k])) &
             & - (high([l, k_l]) - (displacement + half) * high([one, k]))) / (2.0_wp * half)
          if (window < 2.0_wp * displacement) then
@@ -122,121 +107,46 @@ contains
       rates = [broken(1), force * broken(1) + displacement * broken(2), broken(2)]
    end subroutine follow
 
-   !> Breaks of newborns over displacement.
-   pure function newborn_rates(self, life) result(rates)
+   !> State and rates of newborns, as those of follow, after a displacement since attaching.
+   pure subroutine newborn_at(self, displacement, state, rates)
       class(table_lives_type), intent(in) :: self
-      !> Displacement since the attaching
-      real(wp), intent(in) :: life
-      !> Density of breaks, of the force released by them, and of the stiffness lost
-      real(wp) :: rates(3)
-
-      real(wp) :: state(3)
-
-      call follow(self%newborn, self%back_force, self%window, life, state, rates)
-   end function newborn_rates
-
-   !> Survival of newborns.
-   pure function newborn_state(self, life) result(state)
-      class(table_lives_type), intent(in) :: self
-      !> Displacement since the attaching
-      real(wp), intent(in) :: life
-      !> Part that is pinned, its stiffness and force
-      real(wp) :: state(3)
-
-      real(wp) :: rates(3)
-
-      call follow(self%newborn, self%back_force, self%window, life, state, rates)
-   end function newborn_state
-
-   !> Breaks of contacts that were relaxed.
-   pure function relaxed_rates(self, displacement) result(rates)
-      class(table_lives_type), intent(in) :: self
-      !> Displacement since the start
       real(wp), intent(in) :: displacement
-      !> As those of newborns
-      real(wp) :: rates(3)
+      real(wp), intent(out) :: state(3), rates(3)
 
-      real(wp) :: state(3)
+      call follow(self%newborn, self%back_force, self%window, displacement, state, rates)
+   end subroutine newborn_at
 
-      call follow(self%unforced, 0.0_wp, self%window, displacement, state, rates)
-   end function relaxed_rates
-
-   !> Survival of contacts that were relaxed.
-   pure function relaxed_state(self, displacement) result(state)
+   !> State and rates of the first generation, as those of follow, after a displacement since the
+   !> start.
+   pure subroutine first_at(self, initial, displacement, state, rates)
       class(table_lives_type), intent(in) :: self
-      !> Displacement since the start
+      !> One of the initial_ codes
+      integer, intent(in) :: initial
       real(wp), intent(in) :: displacement
-      !> As that of newborns
-      real(wp) :: state(3)
-
-      real(wp) :: rates(3)
-
-      call follow(self%unforced, 0.0_wp, self%window, displacement, state, rates)
-   end function relaxed_state
-
-   !> Breaks of contacts of slow sliding: as many for each displacement since the attaching.
-   pure function steady_rates(self, displacement) result(rates)
-      class(table_lives_type), intent(in) :: self
-      !> Displacement since the start
-      real(wp), intent(in) :: displacement
-      !> As those of newborns
-      real(wp) :: rates(3)
-
-      real(wp) :: moment(k_squared)
-
-      call self%newborn%above(displacement, moment)
-      rates = [moment(one), moment(k_l) + self%back_force * moment(one), moment(k)] &
-         & / self%mean_life
-   end function steady_rates
-
-   !> Survival of contacts of slow sliding: of a life l the part 1 - x/l.
-   pure function steady_state(self, displacement) result(state)
-      class(table_lives_type), intent(in) :: self
-      !> Displacement since the start
-      real(wp), intent(in) :: displacement
-      !> As that of newborns
-      real(wp) :: state(3)
-
-      real(wp) :: m(k_squared)
-
-      call self%newborn%above(displacement, m)
-      associate (x => displacement)
-         state(1) = m(l) - x * m(one)
-         state(2) = m(k_l) - x * m(k)
-         state(3) = 0.5_wp * (m(k_l_squared) - x**2 * m(k)) + self%back_force * state(1)
-      end associate
-      state = state / self%mean_life
-   end function steady_state
-
-   !> Breaks of contacts of uniform stretches.
-   pure function uniform_rates(self, displacement) result(rates)
-      class(table_lives_type), intent(in) :: self
-      !> Displacement since the start
-      real(wp), intent(in) :: displacement
-      !> As those of newborns
-      real(wp) :: rates(3)
-
-      real(wp) :: moment(orders)
-
-      call self%unforced%above(displacement, moment)
-      rates = [moment(inverse_l), moment(k), moment(k_over_l)]
-   end function uniform_rates
-
-   !> Survival of contacts of uniform stretches: the part 1 - x/x_s, uniform above x.
-   pure function uniform_state(self, displacement) result(state)
-      class(table_lives_type), intent(in) :: self
-      !> Displacement since the start
-      real(wp), intent(in) :: displacement
-      !> As that of newborns
-      real(wp) :: state(3)
+      real(wp), intent(out) :: state(3), rates(3)
 
       real(wp) :: m(orders)
 
-      call self%unforced%above(displacement, m)
       associate (x => displacement)
-         state = [m(one) - x * m(inverse_l), m(k) - x * m(k_over_l), &
-            & 0.5_wp * (m(k_l) - x**2 * m(k_over_l))]
+         select case (initial)
+         case (initial_steady)
+            ! Displacements since attaching are uniform: of a life l the share 1 - x/l remains.
+            call self%newborn%above(x, m(:k_squared))
+            state(1) = m(l) - x * m(one)
+            state(2) = m(k_l) - x * m(k)
+            state(3) = 0.5_wp * (m(k_l_squared) - x**2 * m(k)) + self%back_force * state(1)
+            state = state / self%mean_life
+            rates = [m(one), m(k_l) + self%back_force * m(one), m(k)] / self%mean_life
+         case (initial_uniform)
+            ! The share 1 - x/x_s remains, with stretches uniform above x.
+            call self%unforced%above(x, m)
+            state = [m(one) - x * m(inverse_l), m(k) - x * m(k_over_l), &
+               & 0.5_wp * (m(k_l) - x**2 * m(k_over_l))]
+            rates = [m(inverse_l), m(k), m(k_over_l)]
+         case default
+            call follow(self%unforced, 0.0_wp, self%window, x, state, rates)
+         end select
       end associate
-   end function uniform_state
+   end subroutine first_at
 
 end module mesoslip_theory_table_lives

@@ -1,4 +1,4 @@
-!> Klein's case with few contacts and a fast drive that comes back, for tests of whole runs.
+!> Klein's case with few contacts and a fast drive forward and back, for tests of whole runs.
 module klein_case
    use mesoslip_contacts, only: make_contacts
    use mesoslip_contacts_mechanics, only: coupling_equal, coupling_names, coupling_scaled
@@ -18,7 +18,7 @@ module klein_case
 
    !> Number of contacts
    integer, parameter :: count = 200
-   !> A number of advances and an amount of work that no run comes to
+   !> A number of advances and an amount of work that no run reaches
    integer(i8), parameter :: forever = 1000000000_i8
    real(wp), parameter :: any_work = 1.0e18_wp
 
@@ -26,11 +26,9 @@ module klein_case
 
 contains
 
-   !> Klein's case with few contacts and a fast drive that comes back.
    subroutine build(simulation, contacts, slider, law, width, coupling, solver)
       type(simulation_type), intent(out) :: simulation
-      character(len=*), intent(in) :: contacts, slider
-      character(len=*), intent(in) :: law, solver
+      character(len=*), intent(in) :: contacts, slider, law, solver
       integer, intent(in) :: coupling
       real(wp), intent(in) :: width
 
@@ -132,11 +130,10 @@ contains
          & snapshot_size=20.0_wp), [0.01_wp, 0.1_wp], simulation%contacts%individual_count())
    end subroutine build
 
-   !> Klein's case with schedules of a length, and nothing recorded that needs each event.
+   !> Klein's case with schedules of a length; no record needs each event.
    subroutine prepare(simulation, contacts, slider, law, width, delay, longest)
       type(simulation_type), intent(out) :: simulation
-      character(len=*), intent(in) :: contacts, slider
-      character(len=*), intent(in) :: law
+      character(len=*), intent(in) :: contacts, slider, law
       integer, intent(in) :: longest
       real(wp), intent(in) :: width, delay
 

@@ -1,4 +1,4 @@
-!> Laws of ageing: limits, rates by differences, and which contacts break under a force.
+!> Ageing laws: limits, rates by differences, and the contacts that break under a force.
 program test_ageing_law
    use mesoslip_contacts_ageing_law, only: ageing_law_type, take_ageing_law
    use mesoslip_contacts_ageing_meeting, only: meet, meet_bound, meet_newborn
@@ -50,7 +50,7 @@ program test_ageing_law
    call take("relax", [0.0_wp, 0.4_wp])
    call check(allocated(error), "young without force are refused")
    call take("relax", [0.01_wp, 0.001_wp])
-   call check(allocated(error), "young of whom none can attach are refused")
+   call check(allocated(error), "young contacts that cannot attach are refused")
    call take("log", [-0.1_wp])
    call check(allocated(error), "a growth below 0 is refused")
    call take("none", [0.1_wp])
@@ -95,7 +95,7 @@ contains
             & - law%threshold(0.9_wp, 1.0_wp, ages(place))) / (2.0_wp * step)
          call check_close(rate, difference, 1.0e-9_wp, "rate")
          call check_close(law%configured(threshold, ages(place) + step), 0.9_wp, 1.0e-14_wp, &
-            & "who breaks")
+            & "threshold that breaks")
          ! In any unit.
          call check_close(law%threshold(0.9e-8_wp, 1.0e-8_wp, ages(place) + step), &
             & 1.0e-8_wp * threshold, 1.0e-22_wp, "unit")

@@ -1,4 +1,4 @@
-!> The queue against a plain search for the least key, through many shapes of load.
+!> The queue against a plain search for the minimum key, for many distributions of keys.
 program test_contact_queue
    use mesoslip_contacts_individual_queue, only: contact_queue_type, new_contact_queue, no_key
    use mesoslip_contacts_individual_record, only: ahead_coordinate, record_length, row_limit, &
@@ -20,7 +20,7 @@ program test_contact_queue
 
 contains
 
-   !> Take contacts out and put them in again farther ahead, many times over.
+   !> Remove contacts and insert them farther ahead, many times.
    subroutine exercise(count, spread, least, stretch, direction, name)
       !> Contacts
       integer, intent(in) :: count
@@ -73,7 +73,7 @@ contains
             & .and. abs(ahead_coordinate(record(:, contact), direction) - key) <= 0.0_wp
          record(row_stiffness, contact) = 0.0_wp
          call uniform_pair(1_i8, 0_i8, int(contact, i8), int(event, i8), 0_i8, uniform)
-         ! Now and then the slider has gone back before the contact attaches.
+         ! Sometimes the slider has moved back before the contact attaches.
          position = key
          if (uniform(2) < 0.02_wp) position = key - 0.4_wp * stretch
          call put(queue, record, direction, contact, &
@@ -82,7 +82,7 @@ contains
       call check(in_order, "least key first: " // name)
       call check(in_preview .and. (previewed > 0 .or. .not. spread > 0.0_wp), &
          & "the next contacts are listed in their order: " // name)
-      call check(queue%count == count, "none lost: " // name)
+      call check(queue%count == count, "no contact is lost: " // name)
       do event = 1, count
          call queue%pop(record, contact)
       end do

@@ -1,19 +1,21 @@
-!> The drive by itself, and the work that sliders in equilibrium count with it.
+!> The drive, and its work on sliders in equilibrium.
 program test_drive
    use mesoslip_drive, only: drive_type
    use mesoslip_interface_law, only: interface_law_type, window_type
    use mesoslip_numerics_errors, only: error_type
    use mesoslip_numerics_kinds, only: wp
+   use mesoslip_numerics_parameters, only: new_parameters, parameters_type
    use mesoslip_recording_steady, only: steady_recorder_type
-   use mesoslip_sliders_base, only: motion_type
+   use mesoslip_sliders_base, only: motion_type, slider_type
+   use mesoslip_sliders_instant, only: instant_slider_type
    use mesoslip_sliders_prescribed, only: slider_prescribed_type
    use mesoslip_sliders_quasistatic, only: slider_quasistatic_type
-   use mesoslip_sliders_quasistatic_force, only: slider_quasistatic_force_type
+   use mesoslip_sliders_quasistatic_force, only: make_slider_quasistatic_force
    use testing, only: check, check_close, finish
    implicit none
 
    call goes_through_parts()
-   call comes_to_rest()
+   call ramp_to_rest()
    call keeps_value_and_work()
    call has_a_part()
    call pulls_a_spring()
@@ -25,7 +27,7 @@ program test_drive
 
 contains
 
-   !> A ramp up, one that turns round within it, and a stage of its own at rest.
+   !> A ramp up, a ramp that turns round, and a second stage at rest.
    subroutine goes_through_parts()
       type(drive_type) :: drive
       type(error_type), allocatable :: error
@@ -53,8 +55,8 @@ contains
       call check_close(drive%at(5.0_wp), 4.0_wp, 0.0_wp, "a drive at rest")
    end subroutine goes_through_parts
 
-   !> A ramp to rest does not turn round, wherever rounding takes its time of rest.
-   subroutine comes_to_rest()
+   !> A ramp to rest does not turn round, whatever the rounding of its time of rest.
+   subroutine ramp_to_rest()
       integer, parameter :: cases = 200
       type(error_type), allocatable :: error
       integer :: first, second
@@ -77,7 +79,7 @@ contains
          end do
       end do
       call check(is_right .and. .not. allocated(error), "a ramp to rest ends at its end")
-   end subroutine comes_to_rest
+   end subroutine ramp_to_rest
 
    !> Another origin changes neither work nor impulse; a stage counts its impulse from zero.
    subroutine keeps_value_and_work()
@@ -137,17 +139,20 @@ contains
          & "maximum of the force")
    end subroutine pulls_a_spring
 
-   !> The same under a force that grows faster and faster, with another origin halfway: x = F/K_c.
+   !> The same under an accelerated force, with another origin halfway: x = F/K_c.
    subroutine pulls_with_a_force()
       real(wp), parameter :: contacts = 3.0_wp, rate = 0.5_wp, acceleration = 0.7_wp, &
          & times(2) = [0.6_wp, 1.5_wp], shift = 0.125_wp
-      type(slider_quasistatic_force_type) :: slider
+      class(slider_type), allocatable :: slider
+      type(parameters_type) :: parameters
+      type(error_type), allocatable :: error
       type(interface_law_type) :: law
       type(window_type) :: window
       type(motion_type) :: motion
       real(wp) :: force
 
-      slider%pull_over_value = 1.0_wp
+      call new_parameters(parameters, [character(len=1) ::], [real(wp) ::])
+      call make_slider_quasistatic_force(slider, parameters, error)
       law%stiffness = contacts
       call slider%start(law)
       call slider%drive%change(0.0_wp, rate, acceleration)
@@ -171,7 +176,10 @@ contains
       call check_close(slider%drive%stage_impulse(), &
          & 0.5_wp * rate * times(2)**2 + acceleration * times(2)**3 / 6.0_wp, 1.0e-15_wp, &
          & "impulse of a force")
-      call check(slider%max_breaks < huge(1.0_wp), "contacts can break without end")
+      select type (slider)
+      class is (instant_slider_type)
+         call check(slider%max_breaks < huge(1.0_wp), "contacts can break without end")
+      end select
    end subroutine pulls_with_a_force
 
    !> A prescribed slider that accelerates from rest: the contact force K x + C v has an extreme at

@@ -29,7 +29,7 @@ program test_hazard_clock
 
 contains
 
-   !> Readings over parts of a step, and the times at which a clock comes to them.
+   !> Readings over parts of a step, and the times at which a clock reaches them.
    subroutine exercise(slope, series, name)
       !> Change of the exponent with the displacement
       real(wp), intent(in) :: slope
@@ -59,8 +59,7 @@ contains
       call check(time > 1.0_wp, name // ": not within the step")
    end subroutine exercise
 
-   !> Of two clocks the first to come to its reading ends the step, and the other goes on until
-   !> then.
+   !> The first of two clocks to reach its reading ends the step, and the other advances until then.
    subroutine the_first_ends_the_step(series, slope, name)
       !> Coefficients of the velocity in a step of length 1
       real(wp), intent(in) :: series(0:)

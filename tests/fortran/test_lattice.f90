@@ -1,4 +1,4 @@
-!> Contacts with a place: who breaks first, who is next to whom, how far an avalanche reaches.
+!> Contacts on a lattice: the first to break, neighbours, the extent of an avalanche.
 program test_lattice
    use mesoslip_contacts_individual_avalanche_track, only: avalanche_track_type, new_avalanche_track
    use mesoslip_contacts_individual_break_tree, only: break_tree_type, new_break_tree
@@ -51,7 +51,7 @@ contains
       deviate = uniform(1)
    end function deviate
 
-   !> The tree against a plain search, while contacts come, change and go.
+   !> The tree against a plain search, while contacts are added, changed and removed.
    subroutine breaks_first(count)
       integer, intent(in) :: count
 
@@ -107,7 +107,7 @@ contains
       end do
    end subroutine list_neighbours
 
-   !> Each bond is there from both ends, and none leads back to its start.
+   !> Each bond is there from both ends, and no site is its own neighbour.
    subroutine have_neighbours(lattice, columns, rows)
       integer, intent(in) :: lattice, columns, rows
 
@@ -176,7 +176,7 @@ contains
       end do
    end function shortest
 
-   !> Contacts start able to bear their neighbours, and none is lost in moves forth and back.
+   !> Contacts start below their thresholds, and are conserved in motions forward and back.
    subroutine balances()
       integer, parameter :: columns = 12, rows = 10, number = columns * rows
       type(contact_lattice_type) :: contacts
@@ -188,7 +188,7 @@ contains
       call build(contacts, columns, rows, bond, 1.0e-3_wp)
       call contacts%initialize(initial_uniform)
       call check(contacts%detached_count > 0.0_wp .and. contacts%breaks <= 0.0_wp, &
-         & "what neighbours push over at the start is detached, and no break")
+         & "contacts above their thresholds at the start are detached, without a break")
       is_whole = .true.
       bears = .true.
       adds_up = .true.
@@ -263,7 +263,7 @@ contains
       call check_close(contacts%detached_count, 0.0_wp, 0.0_wp, "all attach again at once")
    end subroutine ends_cascade
 
-   !> A lattice that does not hold the contacts.
+   !> A lattice with another number of sites.
    subroutine refuses()
       type(contact_lattice_type) :: contacts
       type(contact_parameters_type) :: parameters

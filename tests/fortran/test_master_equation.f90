@@ -1,8 +1,7 @@
-!> Quadrature, partial moments, lives of contacts, their renewal, and populations under a slider,
-!> under all run-time checks.
+!> Quadrature, partial moments, lives of contacts, their renewal, and populations under a slider.
 program test_master_equation
    use mesoslip_numerics_accumulator, only: accumulator_type
-   use mesoslip_theory_lives, only: contact_lives_type, new_contact_lives
+   use mesoslip_theory_lives, only: contact_lives_type, make_contact_lives
    use mesoslip_contacts_mechanics, only: breaking_distance, broken_threshold, &
       & broken_threshold_slope, coupling_equal, coupling_scaled, initial_relaxed, initial_steady, &
       & initial_uniform
@@ -12,6 +11,7 @@ program test_master_equation
    use mesoslip_interface_law, only: interface_law_type, pose_type, window_type
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_contacts_partial_moments, only: new_partial_moments, partial_moments_type
+   use mesoslip_numerics_parameters, only: new_parameters, parameters_type
    use mesoslip_numerics_quadrature, only: barycentric_weights, gauss_legendre, &
       & integration_matrix, lagrange_basis
    use mesoslip_theory_renewal, only: renewal_solution_type, solve_renewal
@@ -21,7 +21,6 @@ program test_master_equation
    implicit none
 
    real(wp) :: rough, fine
-
 
    call rules()
    call moments("gaussian", 0.3_wp, 0.0_wp)
@@ -87,7 +86,7 @@ contains
       exact = partial%above(0.0_wp)
       call check_close(exact(1), 1.0_wp, 1.0e-12_wp, "all thresholds are above 0")
       exact = partial%above(partial%max_threshold)
-      call check(all(exact <= 0.0_wp), "none is above the greatest")
+      call check(all(exact <= 0.0_wp), "no threshold is above the maximum")
    end subroutine moments
 
    !> Breaking distance and threshold are inverse to each other, in both directions.
@@ -116,23 +115,27 @@ contains
    subroutine renewal()
       type(contact_lives_type) :: lives
       type(renewal_solution_type) :: solution
-      class(threshold_law_type), allocatable :: law
+      type(parameters_type) :: parameters
       type(error_type), allocatable :: error
 
-      call new_threshold_law(law, "exponential", 1.0_wp, 0.0_wp, error)
-      call new_contact_lives(lives, law, coupling_equal, 0.0_wp, 0.0_wp, .true., initial_relaxed)
+      call new_parameters(parameters, [character(len=16) :: "relative_width", "back_force_ratio", &
+         & "newborn_width", "reattach"], [1.0_wp, 0.0_wp, 0.0_wp, 1.0_wp])
+      call parameters%add_word("threshold_law", "exponential")
+      call parameters%add_word("coupling", "equal")
+      call parameters%add_word("initial", "relaxed")
+      call make_contact_lives(lives, parameters, error)
       call check(.not. allocated(error), "exponential lives")
       call solve_renewal(lives, 0.0_wp, 0.25_wp, 80, 10, solution)
       call check_close(maxval(abs(solution%breaks - 1.0_wp)), 0.0_wp, 1.0e-12_wp, "Poisson process")
       call check_close(maxval(abs(solution%pinned - 1.0_wp)), 0.0_wp, 1.0e-12_wp, "conservation")
-      ! Each bears its age, whose mean is 1 - exp(-X).
+      ! The force of a contact is its age, whose mean is 1 - exp(-X).
       call check_close(solution%force(10, 80), &
          & 1.0_wp - exp(-(79.0_wp + solution%point(10)) * 0.25_wp), 1.0e-12_wp, "force")
       call check_close(lives%steady_force, 1.0_wp, 1.0e-12_wp, "stationary force")
    end subroutine renewal
 
-   !> Populations under a slider that goes forth, rests, and comes back: contacts are conserved, and
-   !> what they bear and have lost is the work done on them.
+   !> Populations under a slider that moves forward, rests, and moves back: contacts are conserved,
+   !> and their energy and losses are the work done on them.
    subroutine sliding(coupling, initial, resolution, step_work)
       integer, intent(in) :: coupling, initial
       real(wp), intent(in) :: resolution
@@ -180,7 +183,7 @@ contains
          call contacts%respond(before, after)
          before = after
       end do
-      call check(step < 20000, "the displacement takes so many steps")
+      call check(step < 20000, "the run ends")
       call check_close(contacts%pinned%number_of_contacts() + contacts%detached_count, &
          & 1.0_wp, 1.0e-12_wp, "contacts are conserved")
       call check(contacts%breaks > 2.5_wp, "contacts break")

@@ -1,4 +1,4 @@
-!> Memory that is refused is an error, and what needs none does without.
+!> Refused memory is an error; sorting in place needs none.
 program test_memory
    use mesoslip_contacts_individual_sorting, only: sort, sort_in_place
    use mesoslip_numerics_archive, only: archive_type
@@ -9,7 +9,7 @@ program test_memory
    use testing, only: check, finish
    implicit none
 
-   !> So many numbers that their product is the length of no array
+   !> Numbers whose product is too long for any array
    integer, parameter :: half_huge = 2**30
 
    call table()
@@ -25,18 +25,15 @@ contains
    !> A table that cannot grow keeps its rows, and reports that one is lost.
    subroutine table()
       type(buffer_type) :: buffer
-      type(error_type), allocatable :: error
 
       call buffer%open(2, 1)
       call buffer%add([1.0_wp, 2.0_wp])
       call buffer%add([3.0_wp, 4.0_wp])
-      call buffer%report_failure(error)
-      call check(buffer%count == 2 .and. .not. allocated(error), "a table grows")
+      call check(buffer%count == 2 .and. .not. allocated(buffer%failure), "a table grows")
       call buffer%open(half_huge, 0)
       buffer%count = half_huge / 2
       call buffer%reserve()
-      call buffer%report_failure(error)
-      call check(.not. buffer%has_room() .and. has_status(error), "a row is refused")
+      call check(.not. buffer%has_room() .and. has_status(buffer%failure), "a row is refused")
    end subroutine table
 
    !> A checkpoint whose shapes are damaged asks for more memory than there is.
@@ -61,7 +58,7 @@ contains
       call check(size(values) == 0, "an array that has no room is empty")
    end subroutine checkpoint
 
-   !> Take what was put into an archive out of it.
+   !> Take the arrays out of an archive.
    subroutine read_again(saved, values, numbers)
       type(archive_type), intent(in) :: saved
       real(wp), allocatable, intent(inout) :: values(:, :)
@@ -86,7 +83,7 @@ contains
 
       do one = 1, count
          call uniform_pair(1_i8, 0_i8, int(one, i8), 0_i8, 0_i8, uniform)
-         ! Few different keys: contacts of the same are in the order of their numbers.
+         ! Few different keys: equal ones are in the order of the contacts' numbers.
          key(one) = anint(50.0_wp * uniform(1))
          contact(one) = 1 + modulo(7 * one, max(1, count))
       end do

@@ -24,11 +24,11 @@ program test_random
 
    call uniform_pair(7_i8, 2_i8, 5_i8, 3_i8, 0_i8, pair)
    call uniform_pair(7_i8, 2_i8, 5_i8, 3_i8 + 2_i8**32, 0_i8, other)
-   call check(all(abs(pair - other) > 0.0_wp), "renewals beyond 2**32 are reported apart")
+   call check(all(abs(pair - other) > 0.0_wp), "renewals beyond 2**32 differ")
    call uniform_pair(7_i8 + 2_i8**40, 2_i8, 5_i8, 3_i8, 0_i8, other)
-   call check(all(abs(pair - other) > 0.0_wp), "seeds beyond 2**32 are reported apart")
+   call check(all(abs(pair - other) > 0.0_wp), "seeds beyond 2**32 differ")
    call uniform_pair(7_i8, 2_i8, 5_i8, 3_i8, 1_i8, other)
-   call check(all(abs(pair - other) > 0.0_wp), "attempts are reported apart")
+   call check(all(abs(pair - other) > 0.0_wp), "attempts differ")
 
    call several_are_as_single_ones()
 
@@ -56,7 +56,7 @@ contains
       call check(all(word == expected), "known answer: " // name)
    end subroutine known_answer
 
-   !> Pairs of many contacts are those that each has alone, however many they are.
+   !> Pairs of several contacts are those of each alone, for any number.
    subroutine several_are_as_single_ones()
       integer, parameter :: most = 70
       integer(i8), parameter :: seed = 7_i8 + 2_i8**40, realization = 2_i8**32 - 1_i8

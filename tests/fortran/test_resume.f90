@@ -1,4 +1,4 @@
-!> A state that is put away and taken up again goes on to the bit, and other states are refused.
+!> A run continues from a saved state to the bit, and other states are refused.
 program test_resume
    use klein_case, only: any_work, build, forever, same, set_drive
    use mesoslip_contacts_mechanics, only: coupling_scaled, initial_relaxed
@@ -11,26 +11,26 @@ program test_resume
    use testing, only: check, finish
    implicit none
 
-   call goes_on("ensemble", "rigid", "series")
-   call goes_on("ensemble", "prescribed", "series")
-   call goes_on("ensemble", "layered", "series")
-   call goes_on("ensemble", "quasistatic", "series")
-   call goes_on("lattice", "rigid", "series")
-   call goes_on("lattice", "quasistatic", "series")
-   call goes_on("populations", "rigid", "series")
-   call goes_on("populations", "layered", "series")
-   call goes_on("ageing", "rigid", "series")
-   call goes_on("ageing", "prescribed", "series")
-   call goes_on("ageing", "quasistatic", "series")
-   call goes_on("ageing populations", "rigid", "series")
-   call goes_on("thermal", "rigid", "series")
-   call goes_on("thermal", "prescribed", "series")
-   call goes_on("thermal ageing", "rigid", "series")
-   call goes_on("thermal ageing populations", "rigid", "series")
+   call continues("ensemble", "rigid", "series")
+   call continues("ensemble", "prescribed", "series")
+   call continues("ensemble", "layered", "series")
+   call continues("ensemble", "quasistatic", "series")
+   call continues("lattice", "rigid", "series")
+   call continues("lattice", "quasistatic", "series")
+   call continues("populations", "rigid", "series")
+   call continues("populations", "layered", "series")
+   call continues("ageing", "rigid", "series")
+   call continues("ageing", "prescribed", "series")
+   call continues("ageing", "quasistatic", "series")
+   call continues("ageing populations", "rigid", "series")
+   call continues("thermal", "rigid", "series")
+   call continues("thermal", "prescribed", "series")
+   call continues("thermal ageing", "rigid", "series")
+   call continues("thermal ageing populations", "rigid", "series")
    call refuses()
    if (len(sundials_version()) > 0) then
-      call goes_on("ensemble", "layered", "adams")
-      call goes_on("ensemble", "layered", "bdf")
+      call continues("ensemble", "layered", "adams")
+      call continues("ensemble", "layered", "bdf")
    else
       print "(a)", "skipped: solvers of CVODE, as this is a build without SUNDIALS"
    end if
@@ -38,11 +38,10 @@ program test_resume
 
 contains
 
-   !> A run that is put away again and again, and taken up by another simulation, is the same to the
-   !> bit: its energy, all that it recorded, and what its integrator did.
-   subroutine goes_on(contacts, slider, solver)
-      character(len=*), intent(in) :: contacts, slider
-      character(len=*), intent(in) :: solver
+   !> A run that is saved again and again, and continued by another simulation, is the same to the
+   !> bit: its energy, its tables, and the counts of its integrator.
+   subroutine continues(contacts, slider, solver)
+      character(len=*), intent(in) :: contacts, slider, solver
 
       type(simulation_type) :: whole
       type(simulation_type), allocatable :: now, next
@@ -66,7 +65,7 @@ contains
       call set_drive(now, short)
       call now%start(initial_relaxed)
       do segment = 1, 100000
-         ! Longer and longer, so that all phases of a run are cut, and the test ends.
+         ! Longer and longer segments cut all phases of a run, and the test ends.
          call now%run(int(1 + segment**3 / 8, i8), any_work, error)
          if (allocated(error) .or. now%ending == ending_drive) exit
          call now%save(length, error)
@@ -81,17 +80,17 @@ contains
          call move_alloc(next, now)
          if (allocated(error)) exit
       end do
-      call check(.not. allocated(error), "a state can be put away and taken up: " // name)
-      call check(now%ending == ending_drive .and. segment > 10, "it comes to its end: " // name)
+      call check(.not. allocated(error), "a state can be saved and restored: " // name)
+      call check(now%ending == ending_drive .and. segment > 10, "a run in segments ends: " // name)
       call check(all(abs(now%energy_balance() - whole%energy_balance()) <= 0.0_wp) &
          & .and. now%advances == whole%advances, "a run in segments is the same: " // name)
       call check(all(now%slider%integrator_counts == whole%slider%integrator_counts), &
-         & "the integrator does the same: " // name)
+         & "counts of the integrator are the same: " // name)
       do table = 1, size(tables)
          call check(same(now%table(trim(tables(table))), whole%table(trim(tables(table)))), &
-            & "what is recorded is the same: " // name // ", " // trim(tables(table)))
+            & "tables are the same: " // name // ", " // trim(tables(table)))
       end do
-   end subroutine goes_on
+   end subroutine continues
 
    !> A state of another kind, of another length, or for a run under way, is refused.
    subroutine refuses()
@@ -122,7 +121,7 @@ contains
       call build(unset, "ensemble", "rigid", "gaussian", 0.1_wp, coupling_scaled, "series")
       call check(unset%is_whole(), "a simulation that has all its parts is whole")
       unset%steady = steady_recorder_type()
-      call check(.not. unset%is_whole(), "one that is not told when to stop is not")
+      call check(.not. unset%is_whole(), "one without conditions to stop is not")
    end subroutine refuses
 
 end program test_resume

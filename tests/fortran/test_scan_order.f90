@@ -1,4 +1,4 @@
-!> Contacts in the order of keys, which leave and come back at any time, against a search of all.
+!> Contacts in the order of keys, removed and inserted at any time, against a search of all.
 program test_scan_order
    use mesoslip_contacts_individual_scan_order, only: new_scan_order, scan_order_type
    use mesoslip_numerics_errors, only: error_type
@@ -14,10 +14,10 @@ program test_scan_order
 
 contains
 
-   !> Contacts come and leave, some with the key that they had before.
+   !> Contacts are inserted and removed, some with their last key.
    subroutine follows(count, width)
       integer, intent(in) :: count
-      !> Keys are spread over so many e-folds
+      !> Keys are spread over this many e-folds
       real(wp), intent(in) :: width
 
       integer, parameter :: steps = 4000, limit = 7

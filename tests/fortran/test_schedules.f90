@@ -29,11 +29,10 @@ program test_schedules
 
 contains
 
-   !> A run is the same to the bit whatever the length of its schedules, none at all included, and
-   !> wherever it is cut, put away and taken up again.
+   !> A run is the same to the bit whatever the length of its schedules, 0 included, and wherever it
+   !> is saved and continued.
    subroutine runs_ahead(contacts, slider, law, width, delay)
-      character(len=*), intent(in) :: contacts, slider
-      character(len=*), intent(in) :: law
+      character(len=*), intent(in) :: contacts, slider, law
       real(wp), intent(in) :: width, delay
 
       integer, parameter :: lengths(6) = [1, 2, 7, 32, 64, 64]
@@ -79,7 +78,7 @@ contains
             & "schedules do not change a run: " // name)
          do table = 1, size(tables)
             call check(same(now%table(trim(tables(table))), whole%table(trim(tables(table)))), &
-               & "what is recorded is the same: " // name // ", " // trim(tables(table)))
+               & "tables are the same: " // name // ", " // trim(tables(table)))
          end do
          deallocate (now)
       end do

@@ -47,8 +47,7 @@ contains
 
    !> Energy is balanced and contacts are conserved, forward, in a hold, and back.
    subroutine closes(contacts, slider, law, width, coupling, initial)
-      character(len=*), intent(in) :: contacts, slider
-      character(len=*), intent(in) :: law
+      character(len=*), intent(in) :: contacts, slider, law
       integer, intent(in) :: coupling, initial
       real(wp), intent(in) :: width
 
@@ -66,14 +65,13 @@ contains
 
    !> Energy of populations is balanced, forward, in a hold, and back.
    subroutine closes_without_contacts(contacts, slider, law, initial)
-      character(len=*), intent(in) :: contacts, slider
-      character(len=*), intent(in) :: law
+      character(len=*), intent(in) :: contacts, slider, law
       integer, intent(in) :: initial
 
       type(simulation_type) :: simulation
 
       call build(simulation, contacts, slider, law, 0.1_wp, coupling_equal, "series")
-      ! What is left of populations is interpolated in tables.
+      ! The survival of populations is interpolated in tables.
       call check_energy(simulation, initial, 1.0e-9_wp, contacts // ", " // slider // ", " // law)
    end subroutine closes_without_contacts
 
@@ -81,7 +79,7 @@ contains
    subroutine check_energy(simulation, initial, tolerance, name)
       type(simulation_type), intent(inout) :: simulation
       integer, intent(in) :: initial
-      !> Maximum residual over the largest term
+      !> Maximum residual over the maximum term
       real(wp), intent(in) :: tolerance
       character(len=*), intent(in) :: name
 
@@ -97,13 +95,12 @@ contains
          & "energy balance: " // name)
       call check(simulation%contacts%breaks > count, "contacts break: " // name)
       call check(simulation%slider%origin + simulation%slider%displacement < 0.0_wp, &
-         & "the slider comes back beyond its start: " // name)
+         & "the slider returns beyond its start: " // name)
    end subroutine check_energy
 
-   !> Layers on a base, damped, close the energy balance as well as their solver does.
+   !> The energy balance of damped layers on a base closes within the error of their solver.
    subroutine elastic(name, solver, tolerance)
-      character(len=*), intent(in) :: name
-      character(len=*), intent(in) :: solver
+      character(len=*), intent(in) :: name, solver
       real(wp), intent(in) :: tolerance
 
       type(simulation_type) :: simulation
@@ -115,7 +112,7 @@ contains
       call simulation%start(initial_relaxed)
       call simulation%run(forever, any_work, error)
       call check(.not. allocated(error) .and. simulation%ending == ending_drive, &
-         & "layers come to the end: " // name)
+         & "a run with layers ends: " // name)
       energy = simulation%energy_balance()
       call check_close(energy(energy_length) / maxval(abs(energy)), 0.0_wp, tolerance, &
          & "energy balance of layers: " // name)
@@ -133,8 +130,8 @@ contains
       end associate
    end subroutine elastic
 
-   !> A slider so light that it needs very many steps between two samples does no more work in a
-   !> segment than it may, and the segments do not change its motion.
+   !> A slider so light that it needs very many steps between two samples keeps to the work of a
+   !> segment, and segments do not change its motion.
    subroutine is_bounded()
       real(wp), parameter :: work = 1000.0_wp
       integer, parameter :: segments = 20
@@ -176,7 +173,7 @@ contains
       call set_drive(simulation, [0.03_wp, 0.05_wp, 0.15_wp])
    end subroutine lighten
 
-   !> Handles: what was closed is an error.
+   !> A closed handle is an error.
    subroutine holds()
       type(simulation_type), pointer :: simulation
       type(error_type), allocatable :: error

@@ -1,4 +1,4 @@
-!> The rigid slider against closed forms, and its ends of windows.
+!> The rigid slider against closed forms, and at ends of windows.
 program test_slider_rigid
    use mesoslip_interface_law, only: interface_law_type, window_type
    use mesoslip_numerics_kinds, only: wp
@@ -24,6 +24,17 @@ program test_slider_rigid
 
 contains
 
+   !> A slider in balance with the contacts, under a drive of constant velocity.
+   subroutine set_up(slider, law, mass, damping)
+      type(slider_rigid_type), intent(out) :: slider
+      type(interface_law_type), intent(in) :: law
+      real(wp), intent(in) :: mass, damping
+
+      slider = slider_rigid_type(mass=mass, stiffness=mass * frequency**2, damping=damping)
+      call slider%start(law)
+      call slider%drive%change(slider%time, drive_velocity, 0.0_wp)
+   end subroutine set_up
+
    !> From rest under a drive of constant velocity, x = v (t - sin(w t)/w).
    subroutine oscillates()
       type(slider_rigid_type) :: slider
@@ -31,9 +42,7 @@ contains
       type(window_type) :: window
       real(wp) :: time
 
-      slider = slider_rigid_type(mass=2.0_wp, stiffness=2.0_wp * frequency**2)
-      call slider%start(law)
-      call slider%drive%change(slider%time, drive_velocity, 0.0_wp)
+      call set_up(slider, law, 2.0_wp, 0.0_wp)
       window%end_time = 10.0_wp
       do while (slider%time < window%end_time)
          call slider%advance(law, window)
@@ -54,9 +63,7 @@ contains
       type(interface_law_type) :: law
       type(window_type) :: window
 
-      slider = slider_rigid_type(mass=1.0_wp, stiffness=frequency**2)
-      call slider%start(law)
-      call slider%drive%change(slider%time, drive_velocity, 0.0_wp)
+      call set_up(slider, law, 1.0_wp, 0.0_wp)
       window%end_time = 10.0_wp
       window%upper = drive_velocity * (0.5_wp - sin(0.5_wp * frequency) / frequency)
       do while (slider%displacement < window%upper)
@@ -66,8 +73,8 @@ contains
       call check_close(slider%time, 0.5_wp, 1.0e-13_wp, "time of a crossing")
    end subroutine stops_at_crossing
 
-   !> A ladder of crossings, from rest under a steady drive: each is met to the bit in displacement,
-   !> and its time, from the closed form, and the velocity there to rounding.
+   !> Many crossings, from rest under a steady drive: the displacement is met to the bit, time and
+   !> velocity, from the closed form, to rounding.
    subroutine climbs(rung)
       !> Distance from one crossing to the next
       real(wp), intent(in) :: rung
@@ -78,9 +85,7 @@ contains
       real(wp) :: off, late, fast
       integer :: crossing
 
-      slider = slider_rigid_type(mass=1.0_wp, stiffness=frequency**2)
-      call slider%start(law)
-      call slider%drive%change(slider%time, drive_velocity, 0.0_wp)
+      call set_up(slider, law, 1.0_wp, 0.0_wp)
       window%end_time = 10.0_wp
       off = 0.0_wp
       late = 0.0_wp
@@ -105,10 +110,10 @@ contains
          & "energy over all crossings")
    end subroutine climbs
 
-   !> The damper leaves the momentum to block and damper alike: M (V + W) is the impulse of the
-   !> drive, its work over its velocity. What the damper takes of the energy is its loss.
+   !> Block and damper share the momentum: M (V + W) is the impulse of the drive, its work over its
+   !> velocity. The energy that the damper takes is its loss.
    subroutine damps(rung)
-      !> Distance from one crossing to the next; it settles whether steps are short or long
+      !> Distance from one crossing to the next, which makes steps short or long
       real(wp), intent(in) :: rung
 
       real(wp), parameter :: mass = 2.0_wp, damping = 1.3_wp
@@ -117,9 +122,7 @@ contains
       type(window_type) :: window
       integer :: crossing
 
-      slider = slider_rigid_type(mass=mass, stiffness=mass * frequency**2, damping=damping)
-      call slider%start(law)
-      call slider%drive%change(slider%time, drive_velocity, 0.0_wp)
+      call set_up(slider, law, mass, damping)
       window%end_time = 10.0_wp
       do crossing = 1, int(1.5_wp / rung)
          window%upper = crossing * rung
@@ -133,8 +136,8 @@ contains
          & 1.0e-12_wp, "energy with a damper")
    end subroutine damps
 
-   !> An oscillation of amplitude 1 about 0 stays inside a window slightly wider, and meets one
-   !> slightly narrower, on either side.
+   !> An oscillation of amplitude 1 about 0 stays inside a slightly wider window, and leaves a
+   !> slightly narrower one, on either side.
    subroutine turns_short_of_crossing()
       integer :: side
 
@@ -157,8 +160,7 @@ contains
       type(interface_law_type) :: law
       type(window_type) :: window
 
-      slider = slider_rigid_type(mass=1.0_wp, stiffness=frequency**2)
-      call slider%start(law)
+      call set_up(slider, law, 1.0_wp, 0.0_wp)
       call slider%drive%change(slider%time, 0.0_wp, 0.0_wp)
       slider%displacement = -side
       window%end_time = 10.0_wp
@@ -202,9 +204,7 @@ contains
       real(wp) :: force
 
       law = interface_law_type(stiffness=5.0_wp, offset=-1.0_wp, drag=0.1_wp)
-      slider = slider_rigid_type(mass=2.0_wp, stiffness=2.0_wp * frequency**2)
-      call slider%start(law)
-      call slider%drive%change(slider%time, drive_velocity, 0.0_wp)
+      call set_up(slider, law, 2.0_wp, 0.0_wp)
       window%end_time = 0.1_wp
       do while (slider%time < window%end_time)
          call slider%advance(law, window)

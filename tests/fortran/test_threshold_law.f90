@@ -218,7 +218,7 @@ contains
       end do
    end subroutine carried
 
-   !> Distance to breaking of the contacts that are left with a probability, by a sum over it.
+   !> Mean distance to breaking of the thresholds above that of a probability, by a sum.
    function distance_above(law, coupling, minimum, probability) result(distance)
       class(threshold_law_type), intent(in) :: law
       integer, intent(in) :: coupling

@@ -12,9 +12,7 @@ contains
 
    !> Check that a condition holds.
    subroutine check(condition, name)
-      !> What must be true
       logical, intent(in) :: condition
-      !> What is checked
       character(len=*), intent(in) :: name
 
       if (condition) then
@@ -27,11 +25,9 @@ contains
 
    !> Check that a number is close to another.
    subroutine check_close(actual, expected, tolerance, name)
-      !> The number, and what it must be
       real(wp), intent(in) :: actual, expected
-      !> Greatest difference, in the unit of the number
+      !> Maximum difference, in the unit of the number
       real(wp), intent(in) :: tolerance
-      !> What is checked
       character(len=*), intent(in) :: name
 
       logical :: is_close
@@ -43,10 +39,10 @@ contains
       end if
    end subroutine check_close
 
-   !> Tell the result and end the program, with status 1 if a check failed.
+   !> Print the result and end the program, with status 1 if a check failed.
    !
    ! It ends here, rather than in the program, so that the memory of the program's variables is
-   ! still in use, and the sanitizer reports only what the kernels have lost.
+   ! still in use, and the sanitizer reports only leaks of the kernels.
    subroutine finish()
       print "(i0, a, i0, a)", passed, " passed, ", failed, " failed"
       if (failed > 0) error stop 1

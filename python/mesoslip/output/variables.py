@@ -34,6 +34,10 @@ class Meaning:
         return {"units": self.units, "long_name": self.long_name, **self.further}
 
 
+class Estimate(Meaning):
+    """A variable with a standard error, which a `Group` adds as a variable of its own."""
+
+
 def _flags(long_name: str, meanings: str) -> Meaning:
     """A variable of small integers with words as their meanings, as in CF."""
     return Meaning("1", long_name, np.int8, further={"flag_meanings": meanings})
@@ -41,6 +45,14 @@ def _flags(long_name: str, meanings: str) -> Meaning:
 
 class Group(dict[str, Meaning]):
     """The variables that a group of an output may have."""
+
+    def __init__(self, base: Mapping[str, Meaning] | None = None, /, **meanings: Meaning) -> None:
+        super().__init__()
+        for name, meaning in {**(base or {}), **meanings}.items():
+            self[name] = meaning
+            if isinstance(meaning, Estimate):
+                label = f"standard error of the {name.replace('_', ' ')}"
+                self[f"{name}_error"] = Meaning(meaning.units, label)
 
     def subset(self, *names: str) -> Group:
         """Some of the variables, in this order."""

@@ -12,7 +12,7 @@ from mesoslip.analysis.rate_and_state.fitting import MIN_P_VALUE, Fit, fit
 from mesoslip.analysis.rate_and_state.motion import LAWS
 from mesoslip.analysis.rate_and_state.record import Record, record_of
 from mesoslip.errors import RunError
-from mesoslip.output.variables import Group, Meaning
+from mesoslip.output.variables import Estimate, Group, Meaning
 from mesoslip.quantities import percent
 
 # Maximum relative misfit of an adequate law, for a record without noise.
@@ -25,8 +25,7 @@ FIT = Group(
     ),
     law=Meaning("1", "evolution law of the state variables", np.str_),
     reference_velocity=Meaning("m s-1", "V0"),
-    reference_force=Meaning("N", "steady force at V0"),
-    reference_force_error=Meaning("N", "standard error of the reference force"),
+    reference_force=Estimate("N", "steady force at V0"),
     a=Meaning("N", "parameter a of the direct effect"),
     a_error=Meaning("N", "standard error of a"),
     b=Meaning("N", "parameter b of the evolution effect"),
@@ -39,8 +38,7 @@ FIT = Group(
     slip_distance2_error=Meaning("m", "standard error of the second slip distance"),
     a_minus_b=Meaning("N", "rate dependence of steady sliding, with the second state variable"),
     a_minus_b_error=Meaning("N", "standard error of the rate dependence"),
-    trend=Meaning("N m-1", "trend of the friction with displacement that was fitted"),
-    trend_error=Meaning("N m-1", "standard error of the trend"),
+    trend=Estimate("N m-1", "trend of the friction with displacement that was fitted"),
     stiffness=Meaning("N m-1", "stiffness of the spring, infinite for a prescribed slider"),
     stiffness_error=Meaning("N m-1", "standard error of the stiffness, 0 if it is that of the run"),
     critical_stiffness=Meaning("N m-1", "stiffness of the spring below which sliding is unstable"),

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from mesoslip.analysis.experiment_stages import Stage
-from mesoslip.output.variables import Group, Meaning
+from mesoslip.output.variables import Estimate, Group, Meaning
 
 _OUTPUT = Meaning("1", "number of the output, from 0", np.int64)
 _STAGE = Meaning("1", "number of the stage of the drive, from 0", np.int64)
@@ -20,8 +20,7 @@ STEADY = Group(
     stage_number=_STAGE,
     stage_start_time=Meaning("s", "start of the stage"),
     velocity=Meaning("m s-1", "velocity of the drive"),
-    steady_force=Meaning("N", "mean force after the transient, against the drive"),
-    steady_force_error=Meaning("N", "standard error of the steady force"),
+    steady_force=Estimate("N", "mean force after the transient, against the drive"),
     steady_force_half_width=Meaning("N", "half the width of the 95 % interval"),
     standard_deviation=Meaning("N", "standard deviation of the force about the mean"),
     transient_time=Meaning("s", "duration of the discarded transient"),
@@ -41,26 +40,20 @@ STEPS = Group(
     velocity_after=Meaning("m s-1", "velocity of the drive after the step"),
     force_before=Meaning("N", "steady force before the step"),
     force_after=Meaning("N", "steady force after the step"),
-    net_change=Meaning("N", "steady force after minus before, (a - b) ln(V/V0)"),
-    net_change_error=Meaning("N", "standard error of the net change"),
+    net_change=Estimate("N", "steady force after minus before, (a - b) ln(V/V0)"),
     peak_force=Meaning("N", "extreme force, from which the evolution starts"),
     peak_is_exact=_IS_EXACT,
-    direct_change=Meaning("N", "extreme force minus steady force before, a ln(V/V0)"),
-    direct_change_error=Meaning("N", "standard error of the direct change"),
-    evolution_change=Meaning("N", "steady force after minus extreme force, -b ln(V/V0)"),
-    evolution_change_error=Meaning("N", "standard error of the evolution change"),
+    direct_change=Estimate("N", "extreme force minus steady force before, a ln(V/V0)"),
+    evolution_change=Estimate("N", "steady force after minus extreme force, -b ln(V/V0)"),
     apparent_a=Meaning("N", "direct change over ln(V/V0)"),
     apparent_b=Meaning("N", "minus evolution change over ln(V/V0)"),
-    rate_dependence=Meaning("N", "net change over ln(V/V0), a - b"),
-    rate_dependence_error=Meaning("N", "standard error of the rate dependence"),
-    relaxation_displacement=Meaning(
+    rate_dependence=Estimate("N", "net change over ln(V/V0), a - b"),
+    relaxation_displacement=Estimate(
         "m", "length of the exponential decay over the slider's displacement"
     ),
-    relaxation_displacement_error=Meaning("m", "standard error of the relaxation displacement"),
-    integral_displacement=Meaning(
+    integral_displacement=Estimate(
         "m", "area between force and steady force, over the evolution change"
     ),
-    integral_displacement_error=Meaning("m", "standard error of the integral displacement"),
     overshoot=Meaning("N", "maximum deviation beyond the steady force after the peak"),
     note=_NOTE,
 )
@@ -76,14 +69,11 @@ HOLDS = Group(
     force_before_error=Meaning("N", "standard error of the steady force before the hold"),
     start_force=Meaning("N", "force at the start of the hold"),
     end_force=Meaning("N", "force at the end of the hold"),
-    relaxation=Meaning("N", "decrease of the force during the hold"),
-    relaxation_error=Meaning("N", "standard error of the relaxation"),
-    drop=Meaning("N", "steady force before minus force at the end of the hold"),
-    drop_error=Meaning("N", "standard error of the drop"),
+    relaxation=Estimate("N", "decrease of the force during the hold"),
+    drop=Estimate("N", "steady force before minus force at the end of the hold"),
     peak_force=Meaning("N", "maximum force of the restart"),
     peak_is_exact=_IS_EXACT,
-    healing=Meaning("N", "peak minus steady force before the hold"),
-    healing_error=Meaning("N", "standard error of the healing"),
+    healing=Estimate("N", "peak minus steady force before the hold"),
     slip_to_peak=Meaning("m", "displacement of the slider from the end of the hold to the peak"),
     load_to_peak=Meaning(
         "m", "displacement of the load point from the end of the hold to the peak"
@@ -98,8 +88,7 @@ CREEP = Group(
     duration=Meaning("s", "duration of the stage"),
     force=Meaning("N", "constant force on the slider"),
     displacement=Meaning("m", "displacement of the slider in the stage"),
-    velocity=Meaning("m s-1", "mean velocity after the transient"),
-    velocity_error=Meaning("m s-1", "standard error of the velocity"),
+    velocity=Estimate("m s-1", "mean velocity after the transient"),
     transient_time=Meaning("s", "duration of the discarded transient"),
     is_steady=Meaning("1", "whether the transient is over, and halves of the rest agree", np.int8),
     note=_NOTE,
@@ -113,8 +102,7 @@ RAMPS = Group(
     hold_time=Meaning("s", "duration of the constant force before the ramp"),
     hold_force=Meaning("N", "constant force before the ramp"),
     end_force=Meaning("N", "force at the end of the ramp"),
-    static_friction=Meaning("N", "maximum force of the contacts, from which the slider slides"),
-    static_friction_error=Meaning("N", "standard error of the static friction"),
+    static_friction=Estimate("N", "maximum force of the contacts, from which the slider slides"),
     slide_time=Meaning("s", "time from the start of the ramp to the maximum"),
     displacement=Meaning("m", "displacement of the slider from the start to the maximum"),
     note=_NOTE,
@@ -127,36 +115,33 @@ RESTARTS = Group(
     hold_time=Meaning("s", "duration of the smaller force before the stage"),
     hold_force=Meaning("N", "smaller constant force before the stage"),
     force=Meaning("N", "constant force on the slider"),
-    restart_time=Meaning(
+    restart_time=Estimate(
         "s", "time from the start of the stage until the slider has moved by the breaking stretch"
     ),
-    restart_time_error=Meaning("s", "standard error of the restart time"),
     note=_NOTE,
 )
 
 # Scalars of a group: those of the line through its rows.
 STEADY_LINE = Group(
-    rate_dependence=Meaning("N", "slope of the steady force over ln V, a - b"),
-    rate_dependence_error=Meaning("N", "standard error of the rate dependence"),
+    rate_dependence=Estimate("N", "slope of the steady force over ln V, a - b"),
     rate_dependence_chi_square=Meaning("1", "chi square of the line"),
     rate_dependence_freedom=Meaning("1", "degrees of freedom of the line", np.int64),
 )
 HEALING_LINE = Group(
-    healing_per_decade=Meaning("N", "increase of the peak per decade of hold time, beta"),
-    healing_per_decade_error=Meaning("N", "standard error of the healing per decade"),
+    healing_per_decade=Estimate("N", "increase of the peak per decade of hold time, beta"),
     healing_per_decade_chi_square=Meaning("1", "chi square of the line"),
     healing_per_decade_freedom=Meaning("1", "degrees of freedom of the line", np.int64),
 )
 
 CREEP_LINE = Group(
-    creep_rate_dependence=Meaning("N", "slope of the force over ln V, a - b"),
-    creep_rate_dependence_error=Meaning("N", "standard error of the creep rate dependence"),
+    creep_rate_dependence=Estimate("N", "slope of the force over ln V, a - b"),
     creep_rate_dependence_chi_square=Meaning("1", "chi square of the line"),
     creep_rate_dependence_freedom=Meaning("1", "degrees of freedom of the line", np.int64),
 )
 FRICTION_LINE = Group(
-    friction_rate_dependence=Meaning("N", "slope of the static friction over ln of the force rate"),
-    friction_rate_dependence_error=Meaning("N", "standard error of the friction rate dependence"),
+    friction_rate_dependence=Estimate(
+        "N", "slope of the static friction over ln of the force rate"
+    ),
     friction_rate_dependence_chi_square=Meaning("1", "chi square of the line"),
     friction_rate_dependence_freedom=Meaning("1", "degrees of freedom of the line", np.int64),
 )

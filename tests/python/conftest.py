@@ -122,6 +122,19 @@ def few_replicas(monkeypatch):
 
 
 @pytest.fixture
+def quick_pictures(monkeypatch):
+    """Pictures that are coarse and not arranged, where it does not matter how they look."""
+    from matplotlib.figure import Figure
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
+
+    save = Figure.savefig
+    monkeypatch.setattr(ConstrainedLayoutEngine, "execute", lambda *_: None)
+    monkeypatch.setattr(
+        Figure, "savefig", lambda *given, **more: save(*given, **more | {"dpi": 30})
+    )
+
+
+@pytest.fixture
 def command(monkeypatch, capfd):
     """Run a command; returns exit status, standard output and standard error."""
 

@@ -142,12 +142,12 @@ def make_shorter(path):
 
 
 @pytest.fixture
-def workshop(tmp_path, monkeypatch, few_replicas):  # noqa: ARG001
+def workshop(tmp_path, monkeypatch):
     """A folder as a reader has it: a clone's runs, an example, an output of it, a table."""
     shutil.copytree(ROOT / "runs", tmp_path / "runs")
+    shutil.copy(ROOT / "runs" / "klein.toml", tmp_path)
     for path in tmp_path.rglob("*.toml"):
         make_shorter(path)
-    shutil.copy(ROOT / "runs" / "klein.toml", tmp_path)
     for name in ("paper-k1002-v42", "basalt-step"):
         for path in (ROOT / "runs" / "measured").glob(f"{name}.*"):
             shutil.copy(path, tmp_path)
@@ -221,6 +221,7 @@ def name_of(page):
     return page.relative_to(ROOT).as_posix()
 
 
+@pytest.mark.usefixtures("few_replicas", "quick_pictures")
 @pytest.mark.parametrize("page", with_long_ones(PAGES), ids=name_of)
 def test_a_page_with_short_runs(page, workshop, command):
     type_page(page, workshop, command)

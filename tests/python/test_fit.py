@@ -5,16 +5,17 @@ from __future__ import annotations
 import json
 import math
 import shutil
+from contextlib import contextmanager
 from types import SimpleNamespace
 
 import mesoslip
 import numpy as np
 import pytest
-from conftest import klein_tables
+from conftest import klein_tables, long
 from mesoslip.errors import ConfigError, FileError
 from mesoslip.execution.stop import Stop, StoppedError
 from mesoslip.execution.store import Store
-from mesoslip.inference import checks, fit_trace, likelihood
+from mesoslip.inference import checks, fit_trace, likelihood, sampler
 from mesoslip.inference.features import Feature
 from mesoslip.inference.fit_plan import Plan
 from mesoslip.inference.prior import FreeParameter, Prior
@@ -38,6 +39,16 @@ SMALL = {
     "output__interval": 2e-3,
 }
 NOISE = 5e-8
+
+
+@contextmanager
+def few_draws():
+    """Fits with short chains and few predictions: enough for what is tested of whole fits."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sampler, "BURN_IN", 60)
+        patch.setattr(sampler, "THIN", 4)
+        patch.setattr("mesoslip.inference.fit.PREDICTIONS", 60)
+        yield
 
 
 def fit_tables(**changes):
@@ -93,10 +104,10 @@ def linear_problem(seed, total=400):
     return truth, estimate, mean, np.sqrt(np.diag(covariance))
 
 
-@pytest.fixture(scope="module")
-def linear_problems():
-    """Some of them, for what is tested of them together."""
-    return [linear_problem(seed) for seed in range(7)]
+@pytest.fixture(scope="module", params=[(0, 1, 4, 5), long(range(14))])
+def linear_problems(request):
+    """Some of them, for what is tested of them together; of the few, three are far from bounds."""
+    return [linear_problem(seed, 300) for seed in request.param]
 
 
 def test_a_normal_problem_has_its_exact_posterior(linear_problems):
@@ -296,7 +307,8 @@ def small_fit(tmp_path_factory):
     """The trace of the small experiment, and its posterior."""
     folder = tmp_path_factory.mktemp("fit")
     tree = experiment()
-    posterior = mesoslip.fit(tree, fit_tables(), store=folder / "kept", executor=1)
+    with few_draws():
+        posterior = mesoslip.fit(tree, fit_tables(), store=folder / "kept", executor=1)
     return tree, posterior, folder
 
 
@@ -341,13 +353,14 @@ def test_the_same_seed_gives_the_same_posterior(small_fit):
             stop.set()
 
     store = folder / "stopped"
-    with pytest.raises(StoppedError):
+    with few_draws(), pytest.raises(StoppedError):
         mesoslip.fit(tree, fit_tables(), store=store, executor=2, progress=watch, stop=stop)
     assert store.exists()
     again = []
-    resumed = mesoslip.fit(
-        tree, fit_tables(), store=store, executor=2, progress=lambda part: again.append(part)
-    )
+    with few_draws():
+        resumed = mesoslip.fit(
+            tree, fit_tables(), store=store, executor=2, progress=lambda part: again.append(part)
+        )
     assert len(again) < 0.85 * len(again + done)
     for key in FREE:
         np.testing.assert_array_equal(resumed["posterior"][key], posterior["posterior"][key])
@@ -388,7 +401,8 @@ def test_simulations_of_another_fit_are_refused(small_fit):
 def test_another_mass_is_no_part_of_the_model():
     """The waveform of slips of a trace of four times the mass disagrees."""
     tree = experiment(slider__mass=4 * 1.47e-3)
-    posterior = mesoslip.fit(tree, fit_tables())
+    with few_draws():
+        posterior = mesoslip.fit(tree, fit_tables())
     assert posterior.attrs["agreement_probability"] < checks.REJECTED
     assert "no parameters in the ranges describe the trace" in posterior.attrs["warnings"]
 
@@ -462,7 +476,8 @@ def test_the_command_fits_and_draws(tmp_path, command, monkeypatch):
 
     config.write_text(tomli_w.dumps(fit_tables()))
     posterior = tmp_path / "posterior.nc"
-    status, printed, _ = command("fit", output, config, "-o", posterior, "--quiet")
+    with few_draws():
+        status, printed, _ = command("fit", output, config, "-o", posterior, "--quiet")
     assert status == 0
     assert "contacts.static_force" in printed
     assert "µN" in printed

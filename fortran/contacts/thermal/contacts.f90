@@ -54,6 +54,7 @@ contains
       call move_alloc(self, contacts)
    end subroutine make_thermal_contacts
 
+   !> Draw all contacts, and insert them.
    subroutine initialize_thermal(self, state)
       class(thermal_contacts_type), intent(inout) :: self
       integer, intent(in) :: state

@@ -326,6 +326,7 @@ contains
       self%hazard%reference = self%hazard%reference - shift
    end subroutine shift_order
 
+   !> Exchange what all thermal contacts keep.
    subroutine exchange_thermal(self, archive)
       class(thermal_keys_type), intent(inout) :: self
       type(archive_type), intent(inout) :: archive

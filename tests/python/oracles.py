@@ -482,3 +482,81 @@ def ageing_force(config: Config, velocity: float) -> float:
     work = np.sum(chance * (back * last + speed * last**2 / 2))
     time = np.sum(chance * last)
     return contacts.static_force * work / time
+
+
+@dataclass(frozen=True)
+class Friction:
+    """Rate-and-state friction of one state variable: F_0 [N, or 1], V_0 [m/s], a, b and D_c."""
+
+    reference_force: float
+    reference_velocity: float
+    a: float
+    b: float
+    slip_distance: float
+    law: str = "ageing"
+
+    def evolution(self, ratio: float, state: float) -> float:
+        """Derivative of ψ = ln(V_0 θ/D_c) at a velocity over V_0."""
+        rate = self.reference_velocity / self.slip_distance
+        if self.law == "ageing":
+            return rate * (math.exp(min(-state, 100.0)) - ratio)
+        return -rate * ratio * (math.log(ratio) + state) if ratio > 0 else 0.0
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Force of the spring and displacement of the slider at some times."""
+
+    force: np.ndarray
+    displacement: np.ndarray
+
+
+def spring_slider(
+    law: Friction, stages, times: np.ndarray, stiffness: float, *, damping: float = 0.0
+) -> Motion:
+    """A slider on a spring, from steady sliding on, by LSODA: its force k (X_lp - X) is that of
+    friction, F + η V, so that (a + η V) d ln V/dt = k (V_lp - V) - b dψ/dt.
+
+    With an infinite stiffness it moves with the load point, and has no force where that is at rest.
+    """
+    reference, is_rigid = law.reference_velocity, math.isinf(stiffness)
+
+    def on_spring(time, at, start, acceleration):
+        ratio = math.exp(min(at[0], 100.0))
+        velocity = reference * ratio
+        change = law.evolution(ratio, at[1])
+        loading = stiffness * (start + acceleration * time - velocity)
+        return [(loading - law.b * change) / (law.a + damping * velocity), change, velocity]
+
+    def rigid(time, at, start, acceleration):
+        velocity = max(start + acceleration * time, 0.0)
+        return [0.0, law.evolution(velocity / reference, at[1]), velocity]
+
+    begin, logarithm = 0.0, math.log(stages[0].start_velocity / reference)
+    at = [logarithm, -logarithm, 0.0]
+    path = np.zeros((times.size, 3))
+    driven = np.zeros(times.size)
+    for number, stage in enumerate(stages):
+        end = begin + stage.duration if number < len(stages) - 1 else math.inf
+        inside = (times > begin) & (times <= end) if number else times <= end
+        since = np.clip(times[inside] - begin, 0.0, end - begin)
+        acceleration = (stage.end_velocity - stage.start_velocity) / stage.duration
+        found, report = integrate.odeint(
+            rigid if is_rigid else on_spring,
+            at,
+            np.concatenate([[0.0], since, [end - begin] if math.isfinite(end) else []]),
+            args=(stage.start_velocity, acceleration),
+            tfirst=True,
+            rtol=1e-10,
+            atol=[1e-10, 1e-10, 1e-16],
+            mxstep=20_000,
+            full_output=True,
+        )
+        assert report["message"] == "Integration successful."
+        path[inside], at = found[1 : 1 + since.size], found[-1]
+        driven[inside] = stage.start_velocity + acceleration * since
+        begin = end
+    velocity = driven if is_rigid else reference * np.exp(path[:, 0])
+    rate = np.log(np.where(velocity > 0, velocity, np.nan) / reference)
+    force = law.reference_force + law.a * rate + law.b * path[:, 1] + damping * velocity
+    return Motion(force, path[:, 2])

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from conftest import klein_tables
 from mesoslip.analysis.alternating_extremes import extremes_of
-from mesoslip.analysis.rate_and_state.motion import Loading, RateAndState, spring_slider
+from mesoslip.analysis.rate_and_state import Loading
 from mesoslip.analysis.sampled_slips import find_slips
 from mesoslip.analysis.stick_phases import stick_phases
+from oracles import Friction, spring_slider
 from scipy.signal import lfilter
 
 STATIC_FORCE = 18e-6
@@ -97,7 +98,7 @@ def test_slips_under_every_noise_are_those_of_the_exact_catalogue(run, kind, rel
 @pytest.mark.parametrize("noise", [0.0, 1e-5, 1e-4, 1e-3])
 def test_rate_and_state_has_its_eight_slips(noise):
     """Slips of a slider that knows no setup period, with and without noise."""
-    law = RateAndState(0.6, 1e-5, 0.010, 0.015, 1e-6)
+    law = Friction(0.6, 1e-5, 0.010, 0.015, 1e-6)
     period = 8.3
     time = np.linspace(0, 8.2 * period, 30_000)
     stages = [Loading(1.0, 1e-5, 1.05e-5), Loading(time[-1], 1.05e-5, 1.05e-5)]
@@ -141,7 +142,7 @@ def test_smooth_sliding_with_slowly_varying_noise_has_hardly_any_slips():
 @pytest.mark.parametrize("evolution", [0.006, 0.015])
 def test_the_peak_after_a_velocity_step_is_no_slip(evolution):
     """The force rises fast with the drive, and decays slowly, above and below its old value."""
-    law = RateAndState(0.6, 1e-6, 0.010, evolution, 3e-5)
+    law = Friction(0.6, 1e-6, 0.010, evolution, 3e-5)
     stages = [Loading(10.0, 1e-6, 1e-6), Loading(60.0, 1e-5, 1e-5)]
     time = np.linspace(0, 60, 6000)
     force = spring_slider(law, stages, time, 5000.0).force

@@ -1,4 +1,4 @@
-"""Rates and states of measured traces, against motions of another integrator (`spring_slider`)."""
+"""Rates and states of measured traces, against motions of another integrator."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ from mesoslip.analysis import response as responses
 from mesoslip.analysis.experiment_stages import Experiment
 from mesoslip.analysis.rate_and_state import (
     Loading,
+    Points,
     RateAndState,
     fit_laws,
-    measured_rows,
+    fit_rows,
+    points_of_trace,
     records_of,
-    spring_slider,
 )
-from mesoslip.analysis.rate_and_state.correlated import estimate
-from mesoslip.analysis.rate_and_state.points import averaged
-from mesoslip.analysis.rate_and_state.search import Model
+from mesoslip.analysis.rate_and_state.noise import estimated_noise
 from mesoslip.analysis.response import response, rows_of, tables
 from mesoslip.measured.load_point import drive_stages
 from mesoslip.measured.output_groups import stage_group
 from mesoslip.output import writing
+from oracles import Friction, spring_slider
 
 UM = 1e-6
-LAW = RateAndState(0.6, 3 * UM, 0.01, 0.012, 20 * UM, "slip")
+LAW = Friction(0.6, 3 * UM, 0.01, 0.012, 20 * UM, "slip")
 STEP = [Loading(60, 3 * UM, 3 * UM), Loading(60, 10 * UM, 10 * UM)]
 STIFFNESS = 1e-3 / UM
 
@@ -61,7 +61,7 @@ def trace(law=LAW, stages=STEP, noise=3e-4, rate=10.0, *, trend=0.0, known=True,
 
 
 def row_of(tree, law, **options):
-    rows = measured_rows(Experiment(tree), 0, laws=("ageing", "slip"), **options)
+    rows = fit_rows(Experiment(tree), 0, laws=("ageing", "slip"), **options)
     return next(one for one in rows if one["law"] == law)
 
 
@@ -76,8 +76,8 @@ def check(row, law=LAW):
 @pytest.mark.parametrize("slip_distance", [1 * UM, 60 * UM])
 def test_a_step_is_found_over_decades(evolution, slip_distance):
     """With its law, which the record prefers."""
-    law = RateAndState(0.6, 3 * UM, 0.01, 0.009, slip_distance, evolution)
-    rows = measured_rows(Experiment(trace(law, trend=1e-6 / UM)), 0, laws=("ageing", "slip"))
+    law = Friction(0.6, 3 * UM, 0.01, 0.009, slip_distance, evolution)
+    rows = fit_rows(Experiment(trace(law, trend=1e-6 / UM)), 0, laws=("ageing", "slip"))
     row = next(one for one in rows if one["law"] == evolution)
     check(row, law)
     assert row["is_described"]
@@ -91,7 +91,7 @@ def test_no_point_reaches_beyond_its_stage():
     """Where the rate of sampling changes within a point, just before a step."""
     time = np.concatenate([np.arange(0, 59.99, 0.1), np.arange(59.95, 120, 0.001)])
     time = np.unique(time)
-    points = averaged(STEP, time, 0 * time, start=0.0, first_stage=0)
+    points = points_of_trace(STEP, time, 0 * time)
     before = points.time <= STEP[0].duration
     assert (points.time + points.spread)[before].max() <= STEP[0].duration
     assert (points.time - points.spread)[~before].min() > STEP[0].duration
@@ -106,7 +106,7 @@ def test_an_unknown_stiffness_is_fitted():
 
 def test_what_does_not_stand_out_gets_no_numbers():
     """Much noise; and a law without evolution."""
-    for law, noise in ((LAW, 0.05), (RateAndState(0.6, 3 * UM, 0.01, 0, 20 * UM, "slip"), 3e-4)):
+    for law, noise in ((LAW, 0.05), (Friction(0.6, 3 * UM, 0.01, 0, 20 * UM, "slip"), 3e-4)):
         row = row_of(trace(law, noise=noise), "slip")
         assert math.isnan(row["a"])
         assert math.isnan(row["slip_distance"])
@@ -119,7 +119,7 @@ def test_a_hold_and_steps_together_and_by_themselves():
     tree = trace(stages=stages, noise=1e-4)
     experiment = Experiment(tree)
     assert [one.first_stage for one in records_of(experiment)] == [0, 0, 1, 3]
-    rows = measured_rows(experiment, 0, laws=("slip",))
+    rows = fit_rows(experiment, 0, laws=("slip",))
     assert [one["stage_number"] for one in rows] == [-1, 1, 2, 4]
     for row in rows:
         check(row)
@@ -129,13 +129,16 @@ def test_a_hold_and_steps_together_and_by_themselves():
 
 def test_two_states_are_found_where_there_are_two():
     """The motion of two states is that of one for equal distances."""
-    one = fit_laws(records_of(Experiment(trace(noise=1e-5)))[0], STIFFNESS, laws=("slip",))["slip"]
-    model = Model(one.model.points, "slip, two states", STIFFNESS, True)
-    known = dict(zip(one.model.names, one.at, strict=True))
+    record = records_of(Experiment(trace(noise=1e-5)))[0]
+    one = fit_laws(record, laws=("slip",))["slip"]
+    both = RateAndState(
+        record.points, "slip, two states", STIFFNESS, record.distances, with_trend=True
+    )
+    known = dict(zip(one.law.names, one.at, strict=True))
     known |= {"b": 0.3 * known["b"], "b2": 0.7 * known["b"]}
     known["slip_distance2"] = known["slip_distance"]
-    both = np.array([known[name] for name in model.names])
-    np.testing.assert_allclose(model.residuals(both), one.model.residuals(one.at), atol=1e-6)
+    at = np.array([known[name] for name in both.names])
+    np.testing.assert_allclose(both.residuals(at), one.law.residuals(one.at), atol=1e-6)
 
 
 def test_errors_know_of_correlated_noise():
@@ -143,6 +146,7 @@ def test_errors_know_of_correlated_noise():
     pulls, errors = [], []
     time = np.arange(200.0)
     column = np.ones((200, 1))
+    points = Points((), time, 0 * time, time, np.arange(200), column[:, 0], 1.0)
     for seed in range(20):
         rng = np.random.default_rng(seed)
         noise, decay = np.zeros(200), math.exp(-1 / 5)
@@ -151,7 +155,7 @@ def test_errors_know_of_correlated_noise():
             noise[index] = (
                 decay * noise[index - 1] + math.sqrt(1 - decay**2) * rng.standard_normal()
             )
-        found = estimate(time, 0 * time, column[:, 0], 1.0, noise, column, 1e-6)
+        found = estimated_noise(points, noise, column)
         whitened = found.whitened(np.column_stack([column[:, 0], noise]))
         precision = float(whitened[:, 0] @ whitened[:, 0])
         pulls.append(float(whitened[:, 0] @ whitened[:, 1]) / math.sqrt(precision))
@@ -198,4 +202,4 @@ def test_the_response_of_a_trace_of_coefficients(tmp_path, command, monkeypatch)
 
 def test_what_has_no_step_says_so():
     tree = trace(stages=[STEP[0], Loading(60, 3 * UM, 3 * UM)])
-    assert "no step and no hold" in measured_rows(Experiment(tree), 0)[0]["note"]
+    assert "no step and no hold" in fit_rows(Experiment(tree), 0)[0]["note"]

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 from mesoslip.analysis.experiment_stages import Experiment
-from mesoslip.analysis.rate_and_state import measured_rows
+from mesoslip.analysis.rate_and_state import fit_rows
 from mesoslip.measured.load_point import drive_stages
 from mesoslip.measured.output_groups import stage_group
 from scipy.integrate import solve_ivp
@@ -134,7 +134,7 @@ def main(records: int, first: int) -> None:
         truth = draw(seed)
         exact = dict(zip(names, (truth.a, truth.b, truth.slip_distance), strict=True))
         tree = trace(truth, seed)
-        rows = measured_rows(Experiment(tree), 0, laws=("ageing", "slip"))
+        rows = fit_rows(Experiment(tree), 0, laws=("ageing", "slip"))
         row = next((one for one in rows if one["law"] == truth.law), rows[0])
         if not math.isfinite(row["a"]):
             silent.append(seed)

@@ -2,26 +2,28 @@
 
 Prints the tables of ``docs/response.md``::
 
+    export PYTHONPATH=tests/python
     .venv/bin/python tests/studies/response_coverage.py [steady] [runs] [fits]
 """
 
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 
 import mesoslip
 import numpy as np
 from mesoslip.analysis.rate_and_state import (
     Fit,
     Loading,
-    Noise,
-    RateAndState,
-    fit,
-    make_record,
-    spring_slider,
+    Record,
+    fit_laws,
+    known_noise,
+    points_of_run,
 )
 from mesoslip.analysis.steady_force import SteadyMean, steady_mean
 from numpy.typing import NDArray
+from oracles import Friction, spring_slider
 from scipy.signal import lfilter
 
 Array = NDArray[np.float64]
@@ -30,7 +32,7 @@ SAMPLES = 400
 TRACES = 100
 
 # A velocity step up and down and a hold, as in many laboratories; friction coefficients and metres.
-TRUTH = RateAndState(0.6, 1e-6, 0.005, 0.01, 1e-5)
+TRUTH = Friction(0.6, 1e-6, 0.005, 0.01, 1e-5)
 STIFFNESS = 1e3
 STAGES = (
     Loading(20, 1e-6, 1e-6),
@@ -41,6 +43,8 @@ STAGES = (
 )
 INTERVAL = 0.05
 NOISE = 5e-4
+# Range of D_c in the search [m].
+DISTANCES = (6e-7, 6e-5)
 
 
 def autoregression(realizations: int, count: int, repeat: float, seed: int) -> Array:
@@ -84,33 +88,36 @@ def noise_along(way: Array, length: float, generator: np.random.Generator) -> Ar
 
 def synthetic_fit(law: str, length: float, seed: int, fitted: str | None = None) -> Fit:
     """A law fitted to a synthetic record with noise."""
-    truth = RateAndState(
-        TRUTH.reference_force,
-        TRUTH.reference_velocity,
-        TRUTH.a,
-        TRUTH.b,
-        TRUTH.slip_distance,
-        law,
-    )
     times = np.arange(0, sum(one.duration for one in STAGES), INTERVAL)
     # The slip law is unstable in such a step on a spring only twice as stiff as critical.
     stiffness = STIFFNESS if law == "ageing" else 5 * STIFFNESS
-    motion = spring_slider(truth, STAGES, times, stiffness)
+    motion = spring_slider(replace(TRUTH, law=law), STAGES, times, stiffness)
     generator = np.random.default_rng(seed)
     force = motion.force + NOISE * noise_along(motion.displacement, length, generator)
-    record = make_record(
-        STAGES, times, force, motion.displacement, Noise(NOISE, length), stiffness, 2e-5
-    )
-    return fit(record, fitted or law)
+    record = record_of(times, force, motion.displacement, stiffness, NOISE, length)
+    return fit_laws(record, [fitted or law])[fitted or law]
+
+
+def record_of(
+    times: Array,
+    force: Array,
+    displacement: Array,
+    stiffness: float,
+    noise: float,
+    length: float = 0.0,
+    stages: tuple[Loading, ...] = STAGES,
+) -> Record:
+    """A record like that of a run, of known noise."""
+    points = points_of_run(stages, times, force)
+    return Record(points, stiffness, DISTANCES, known_noise(points, displacement, noise, length))
 
 
 def departure(found: Fit) -> Array:
     """How far reference force, a, b and D_c are from the truth, in their errors."""
-    law = found.law
-    values = np.array([law.reference_force, law.a, law.b, law.slip_distance])
-    true = np.array([TRUTH.reference_force, TRUTH.a, TRUTH.b, TRUTH.slip_distance])
-    result: Array = (values - true) / found.errors[:4]
-    return result
+    names = ("reference_force", "a", "b", "slip_distance")
+    return np.array(
+        [(found.value(name) - getattr(TRUTH, name)) / found.error(name) for name in names]
+    )
 
 
 def show_steady() -> None:

@@ -7,12 +7,7 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from mesoslip.analysis.experiment_stages import Experiment
-from mesoslip.analysis.rate_and_state import (
-    MeasuredFit,
-    measured_fits,
-    preferred_law,
-    records_of,
-)
+from mesoslip.analysis.rate_and_state import Fit, fit_laws, preferred_law, records_of
 from mesoslip.analysis.response import response_of, rows_of
 from mesoslip.errors import RunError
 from mesoslip.output.arrays import Arrays, Tree
@@ -28,20 +23,20 @@ Array = NDArray[np.float64]
 MARGIN = 3.0
 
 
-def best_fit(experiment: Experiment) -> MeasuredFit | None:
-    """The law that the record prefers, or the best of one state, if there is a fit."""
+def best_fit(experiment: Experiment) -> Fit | None:
+    """The law that the record prefers, or the best of one state; None without one."""
     records = records_of(experiment)
     if isinstance(records, str):
         return None
     try:
-        fits = measured_fits(experiment, records[0])
+        fits = fit_laws(records[0])
     except RunError:
         return None
     preferred = preferred_law(fits)
     if preferred:
         return fits[preferred]
-    simple = [one for one in fits.values() if one.model.states == 1]
-    return min(simple, key=lambda one: one.information_criterion, default=None)
+    able = [one for one in fits.values() if one.law.states == 1]
+    return min(able, key=lambda one: one.information_criterion, default=None)
 
 
 def draw_measured_record(axes: Axes, experiment: Experiment, scale: Scale) -> None:
@@ -52,19 +47,19 @@ def draw_measured_record(axes: Axes, experiment: Experiment, scale: Scale) -> No
         _draw_fit(axes, experiment, found, scale)
 
 
-def _horizontal(experiment: Experiment, found: MeasuredFit) -> Array:
+def _horizontal(experiment: Experiment, found: Fit) -> Array:
     """Displacement of the load point at the points of a fit [m]."""
-    points = found.model.points
+    points = found.law.points
     sign = experiment.stages[0].direction or 1.0
     drive: Array = sign * np.interp(points.time + points.start, experiment.time, experiment.drive)
     return drive
 
 
-def _draw_fit(axes: Axes, experiment: Experiment, found: MeasuredFit, scale: Scale) -> None:
+def _draw_fit(axes: Axes, experiment: Experiment, found: Fit, scale: Scale) -> None:
     unit = force_unit(experiment)
-    force = (found.model.points.force - found.residual) / unit.size
-    parts = [f"{found.model.law} law"]
-    if found.stands_out and not found.undetermined:
+    force = (found.law.points.force - found.residual) / unit.size
+    parts = [f"{found.law.name} law"]
+    if found.is_determined:
         a, b = (
             with_error(found.value(name) / unit.size, found.error(name) / unit.size)
             for name in ("a", "b")
@@ -78,9 +73,9 @@ def _draw_fit(axes: Axes, experiment: Experiment, found: MeasuredFit, scale: Sca
     axes.legend(loc="best")
 
 
-def _draw_residuals(axes: Axes, experiment: Experiment, found: MeasuredFit, scale: Scale) -> None:
-    """Draw the residuals of a fit over the noise of its points."""
-    deviation = np.sqrt(np.sum(found.noise.factor**2, axis=1)) * found.model.scale
+def _draw_residuals(axes: Axes, experiment: Experiment, found: Fit, scale: Scale) -> None:
+    """Draw the residuals of the points over their noise."""
+    deviation = found.noise.point_deviation * found.law.scale
     x = _horizontal(experiment, found) / scale.size
     axes.plot(x, found.residual / deviation, ".", color="black", markersize=2)
     axes.axhline(0, color=RED)

@@ -1,52 +1,32 @@
-"""Rate-and-state friction: the motion of a spring slider, and fits to records."""
+"""Rate-and-state friction: laws fitted to records of runs and to measured traces."""
 
-from mesoslip.analysis.rate_and_state.fitting import Fit, fit
-from mesoslip.analysis.rate_and_state.measured import (
-    measured_fits,
-    measured_rows,
-    preferred_law,
-    records_of,
-)
-from mesoslip.analysis.rate_and_state.motion import (
-    LAWS,
+from mesoslip.analysis.rate_and_state.law import LAWS, RateAndState
+from mesoslip.analysis.rate_and_state.noise import known_noise
+from mesoslip.analysis.rate_and_state.points import (
     Loading,
-    Motion,
-    RateAndState,
-    spring_slider,
+    Points,
+    points_of_run,
+    points_of_trace,
 )
-from mesoslip.analysis.rate_and_state.points import Points
-from mesoslip.analysis.rate_and_state.record import (
-    Noise,
-    Record,
-    make_record,
-    noise_of,
-    record_of,
-)
-from mesoslip.analysis.rate_and_state.rows import FIT, MAX_MISFIT, fit_rows
-from mesoslip.analysis.rate_and_state.search import MEASURED_LAWS, MeasuredFit, fit_laws
+from mesoslip.analysis.rate_and_state.records import Record, records_of
+from mesoslip.analysis.rate_and_state.rows import FIT, fit_rows, fitted_trend
+from mesoslip.analysis.rate_and_state.search import MAX_MISFIT, Fit, fit_laws, preferred_law
 
 __all__ = [
     "FIT",
     "LAWS",
     "MAX_MISFIT",
-    "MEASURED_LAWS",
     "Fit",
     "Loading",
-    "MeasuredFit",
-    "Motion",
-    "Noise",
     "Points",
     "RateAndState",
     "Record",
-    "fit",
     "fit_laws",
     "fit_rows",
-    "make_record",
-    "measured_fits",
-    "measured_rows",
-    "noise_of",
+    "fitted_trend",
+    "known_noise",
+    "points_of_run",
+    "points_of_trace",
     "preferred_law",
-    "record_of",
     "records_of",
-    "spring_slider",
 ]

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from mesoslip.analysis.experiment_stages import Experiment
-from mesoslip.analysis.rate_and_state.fitting import MIN_P_VALUE, Fit, fit
-from mesoslip.analysis.rate_and_state.motion import LAWS
-from mesoslip.analysis.rate_and_state.record import Record, record_of
+from mesoslip.analysis.rate_and_state.records import records_of
+from mesoslip.analysis.rate_and_state.search import MIN_P_VALUE, Fit, fit_laws, preferred_law
 from mesoslip.errors import RunError
 from mesoslip.output.variables import Estimate, Group, Meaning
 from mesoslip.quantities import percent
-
-# Maximum relative misfit of an adequate law, for a record without noise.
-MAX_MISFIT = 0.01
 
 FIT = Group(
     output_index=Meaning("1", "number of the output, from 0", np.int64),
@@ -61,99 +58,109 @@ FIT = Group(
 
 
 def fit_rows(
-    experiment: Experiment, number: int, *, free_stiffness: bool = False
+    experiment: Experiment,
+    number: int,
+    *,
+    free_stiffness: bool = False,
+    laws: Sequence[str] = (),
 ) -> list[dict[str, Any]]:
-    """Rate-and-state parameters of an output by each law, or a row with the reason for none.
+    """Rate-and-state parameters of an output, which has a number, by each of its laws or of those
+    given; or a row with the reason for none.
 
-    Parameters
-    ----------
-    experiment
-        The output.
-    number
-        Its number.
-    free_stiffness
-        Whether the stiffness is fitted too. Under a prescribed slider it is that of the contacts.
+    The stiffness is that of the experiment unless it is free; free under a prescribed slider, it is
+    that of the contacts.
     """
-    config = experiment.config
-    if free_stiffness and math.isinf(experiment.stiffness) and config is not None:
-        experiment = experiment.with_stiffness(config.contacts.stiffness)
-    record = record_of(experiment)
-    if isinstance(record, str):
-        return [empty_row(number, "", record)]
+    records = records_of(experiment, free_stiffness=free_stiffness)
+    if isinstance(records, str):
+        return [_empty_row(number, "", records)]
     rows = []
-    for law in LAWS:
+    for index, record in enumerate(records):
+        stage = {"stage_number": record.first_stage + 1 if index else -1}
         try:
-            rows.append(_fit_row(number, record, fit(record, law, free_stiffness=free_stiffness)))
+            fits = fit_laws(record, laws)
         except RunError as error:
-            rows.append(empty_row(number, law, str(error)))
+            rows.append(_empty_row(number, "", str(error)) | stage)
+            continue
+        preferred = preferred_law(fits) if record.noise is None else ""
+        rows += [_row(number, one, name == preferred) | stage for name, one in fits.items()]
     return rows
 
 
-def empty_row(number: int, law: str, note: str) -> dict[str, Any]:
-    """A row without parameters.
+def fitted_trend(rows: Sequence[dict[str, Any]]) -> float:
+    """Trend of the friction with displacement of the law of one state that fits a whole record
+    best, unit of the force over metre; 0 without one."""
+    able = [
+        one
+        for one in rows
+        if one["stage_number"] < 0 and math.isfinite(one["trend"]) and "two" not in one["law"]
+    ]
+    return min(able, key=lambda one: float(one["information_criterion"]))["trend"] if able else 0.0
 
-    Parameters
-    ----------
-    number
-        Number of the output.
-    law
-        The law; empty if there is none.
-    note
-        The note.
-    """
+
+def _empty_row(number: int, law: str, note: str) -> dict[str, Any]:
     row = {name: math.nan if one.dtype is np.float64 else 0 for name, one in FIT.items()}
     return row | {"output_index": number, "stage_number": -1, "law": law, "note": note}
 
 
-def _fit_row(number: int, record: Record, found: Fit) -> dict[str, Any]:
-    errors = found.errors
-    relative = found.relative_misfit(record)
-    described = (
-        found.p_value >= MIN_P_VALUE and not found.runs_p_value < MIN_P_VALUE
-        if record.has_noise
-        else relative < MAX_MISFIT
-    ) and not found.at_bounds
-    return empty_row(number, found.law.law, _assessment(record, found, relative, described)) | {
-        "reference_velocity": found.law.reference_velocity,
-        "reference_force": found.law.reference_force,
-        "reference_force_error": errors[0],
-        "a": found.law.a,
-        "a_error": errors[1],
-        "b": found.law.b,
-        "b_error": errors[2],
-        "slip_distance": found.law.slip_distance,
-        "slip_distance_error": errors[3],
-        "a_minus_b": found.law.a - found.law.b,
-        "a_minus_b_error": math.sqrt(
-            max(float(np.array([0, 1, -1, 0]) @ found.covariance[:4, :4] @ [0, 1, -1, 0]), 0.0)
-        ),
-        "stiffness": found.stiffness,
-        "stiffness_error": errors[4] if errors.size > 4 else 0.0,
-        "critical_stiffness": found.law.critical_stiffness,
-        "noise": float(np.sqrt(np.mean(record.deviation**2))) if record.has_noise else 0.0,
-        "residual": found.misfit,
-        "relative_misfit": relative,
-        "chi_square": found.chi_square if record.has_noise else math.nan,
-        "independent_points": found.independent_points,
+def _row(number: int, found: Fit, is_preferred: bool) -> dict[str, Any]:
+    law, noise = found.law, found.noise
+    names = ["reference_force", "stiffness", *(["trend"] if law.with_trend else [])]
+    row = _empty_row(number, law.name, _assessment(found, is_preferred))
+    # Numbers that noise may have made are none.
+    if noise.is_known or found.is_determined:
+        names += ["a", "b", "slip_distance", "a_minus_b"]
+        if law.states == 2:
+            names += ["b2", "slip_distance2"]
+        else:
+            row["critical_stiffness"] = -found.value("a_minus_b") / found.value("slip_distance")
+    row |= {name: found.value(name) for name in names}
+    row |= {f"{name}_error": found.error(name) for name in names}
+    row |= {
+        "reference_velocity": law.points.reference_velocity,
+        "noise": noise.deviation * law.scale,
+        "noise_time": noise.time,
+        "residual": float(np.sqrt(np.mean(found.residual**2))),
+        "relative_misfit": found.relative_misfit,
+        "independent_points": noise.independent_points,
         "fit_p_value": found.p_value,
         "runs_p_value": found.runs_p_value,
-        "information_criterion": found.information_criterion if record.has_noise else math.nan,
-        "is_described": int(described),
+        "evolution_chi_square": found.improvement,
+        "is_described": int(found.is_described),
+        "is_preferred": int(is_preferred),
     }
+    if noise.deviation > 0:
+        row |= {
+            "chi_square": found.mean_square,
+            "information_criterion": found.information_criterion,
+        }
+    return row
 
 
-def _assessment(record: Record, found: Fit, relative: float, described: bool) -> str:
+def _assessment(found: Fit, is_preferred: bool) -> str:
     """A sentence: whether the law describes the record, and the reasons if not."""
-    if described:
-        accuracy = "within the noise" if record.has_noise else f"to {percent(relative)}"
-        return f"describes the record {accuracy}"
-    reasons = []
-    if found.at_bounds:
-        verb = "is" if len(found.at_bounds) == 1 else "are"
-        reasons.append(f"{' and '.join(found.at_bounds)} {verb} not determined by the record")
-    if record.has_noise and found.p_value < MIN_P_VALUE:
-        reasons.append(f"the residuals are {math.sqrt(found.chi_square):.2g} times the noise")
-    if found.runs_p_value < MIN_P_VALUE:
-        reasons.append("the residuals are systematic")
-    reasons.append(f"the misfit is {percent(relative)} of the variation")
-    return "does not describe the record: " + ", ".join(reasons)
+    noise, undetermined, misfit = found.noise, found.undetermined, percent(found.relative_misfit)
+    names = " and ".join(undetermined) + (" is" if len(undetermined) == 1 else " are")
+    if not found.stands_out:
+        return "not determined: the evolution does not stand out of the noise"
+    if undetermined and not noise.is_known:
+        return f"not determined: {names} uncertain by more than 25 %"
+    if found.is_described:
+        accuracy = f"to {misfit}" if noise.deviation == 0 else "within the noise"
+        text = f"describes the record {accuracy}"
+    else:
+        reasons = [f"{names} not determined by the record"] if undetermined else []
+        if found.p_value < MIN_P_VALUE:
+            reasons.append(
+                f"the residuals are {math.sqrt(found.mean_square):.2g} times the noise"
+                if noise.is_known
+                else "residuals exceed the noise where the force evolves"
+            )
+        if found.runs_p_value < MIN_P_VALUE:
+            reasons.append("the residuals are systematic")
+        reasons.append(f"the misfit is {misfit} of the variation")
+        text = f"does not describe the record: {', '.join(reasons)}"
+    return (
+        f"{text}; preferred among the laws whose parameters are determined"
+        if is_preferred
+        else text
+    )

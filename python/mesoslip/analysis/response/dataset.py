@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mesoslip.analysis.experiment_stages import Experiment
-from mesoslip.analysis.rate_and_state.measured import fitted_trend, measured_rows
-from mesoslip.analysis.rate_and_state.rows import FIT, fit_rows
+from mesoslip.analysis.rate_and_state import FIT, fit_rows, fitted_trend
 from mesoslip.analysis.response.columns import (
     CREEP,
     CREEP_LINE,
@@ -146,7 +145,7 @@ def response_of(
     analysed = []
     for number, one in enumerate(experiments):
         has_fit = with_fit and not one.is_forced
-        mine = _fits(one, number, free_stiffness) if has_fit else []
+        mine = fit_rows(one, number, free_stiffness=free_stiffness) if has_fit else []
         fits += mine
         analysed.append(one.without_trend(fitted_trend(mine)) if one.is_measured else one)
     numbered = list(enumerate(analysed))
@@ -191,12 +190,6 @@ def response_of(
     if scaled is not None:
         parts = {name: scaled(data) for name, data in parts.items()}
     return Arrays({}, {}, attributes, parts)
-
-
-def _fits(experiment: Experiment, number: int, free_stiffness: bool) -> list[dict[str, Any]]:
-    """Rows of rate-and-state parameters."""
-    rows_of_fit = measured_rows if experiment.is_measured else fit_rows
-    return rows_of_fit(experiment, number, free_stiffness=free_stiffness)
 
 
 def _part(

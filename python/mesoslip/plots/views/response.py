@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from mesoslip.analysis.experiment_stages import Experiment
-from mesoslip.analysis.rate_and_state import LAWS, MAX_MISFIT, Fit, Record, fit, record_of
+from mesoslip.analysis.rate_and_state import MAX_MISFIT, Fit, fit_laws, records_of
 from mesoslip.analysis.response import healing_line, response_of, steady_line
 from mesoslip.errors import RunError
 from mesoslip.output.arrays import Arrays, Tree
@@ -25,19 +25,20 @@ from mesoslip.quantities import Scale, percent, scale_for, with_error, with_unit
 Array = NDArray[np.float64]
 
 
-def _draw_fit(axes: Axes, experiment: Experiment, record: Record, found: Fit, scale: Scale) -> None:
-    """Draw the force that a rate-and-state law predicts over the record."""
+def _draw_fit(axes: Axes, experiment: Experiment, found: Fit, scale: Scale) -> None:
+    """Draw the record that a rate-and-state law gives, on the same axes."""
     sign = next(one.direction for one in experiment.stages if one.direction)
-    drive = sign * np.interp(record.time + record.start, experiment.time, experiment.drive)
-    force = (record.force - found.residual) / experiment.static_force
+    points = found.law.points
+    drive = sign * np.interp(points.time + points.start, experiment.time, experiment.drive)
+    force = (points.force - found.residual) / experiment.static_force
     parts = [
-        f"{found.law.law} law",
-        f"$a$ = {found.law.a / experiment.static_force:.2g} $F_s$",
-        f"$b$ = {found.law.b / experiment.static_force:.2g} $F_s$",
-        f"$D_c$ = {with_unit(found.law.slip_distance, 'm', 3)}",
+        f"{found.law.name} law",
+        f"$a$ = {found.value('a') / experiment.static_force:.2g} $F_s$",
+        f"$b$ = {found.value('b') / experiment.static_force:.2g} $F_s$",
+        f"$D_c$ = {with_unit(found.value('slip_distance'), 'm', 3)}",
     ]
-    # The table of the response has it too.
-    misfit = found.relative_misfit(record)
+    # As the table does for a law that does not describe the record.
+    misfit = found.relative_misfit
     parts += [f"misfit {percent(misfit)}"] if misfit > MAX_MISFIT else []
     label = fit_label(axes, parts)
     axes.plot(drive / scale.size, force, color=RED, label=label)
@@ -53,18 +54,15 @@ def draw_force(axes: Axes, tree: Tree, _: Options) -> None:
         draw_measured_record(axes, experiment, scale)
         return
     draw_record(axes, experiment, scale)
-    record = record_of(experiment)
-    if isinstance(record, str):
+    records = records_of(experiment)
+    if isinstance(records, str):
         return
-    fits = []
-    for law in LAWS:
-        try:
-            fits.append(fit(record, law))
-        except RunError:
-            continue
-    if fits:
-        best = min(fits, key=lambda one: one.chi_square)
-        _draw_fit(axes, experiment, record, best, scale)
+    try:
+        fits = fit_laws(records[0])
+    except RunError:
+        return
+    best = min(fits.values(), key=lambda one: one.chi_square)
+    _draw_fit(axes, experiment, best, scale)
 
 
 def draw_steady(axes: Axes, data: Arrays) -> None:

@@ -14,7 +14,7 @@ from mesoslip.output import files
 
 
 class FromRuns(Protocol):
-    """What is made of outputs."""
+    """A figure or claim."""
 
     @property
     def runs(self) -> tuple[str, ...]:
@@ -28,15 +28,7 @@ Made = TypeVar("Made", bound=FromRuns)
 def chosen(
     names: Iterable[str], known: Mapping[str, Made], what: str, outputs: Path
 ) -> dict[str, Made]:
-    """Those of the given names, or all; the outputs that they need are there.
-
-    Raises
-    ------
-    ConfigError
-        If a name is not known.
-    FileError
-        If an output is missing.
-    """
+    """Figures or claims of names, or all; the outputs that they need exist."""
     names = tuple(names) or tuple(known)
     unknown = [name for name in names if name not in known]
     if unknown:

@@ -1,4 +1,4 @@
-"""What the scripts have in common: their arguments, and one line for a mistake."""
+"""Arguments of the scripts, and their report of mistakes."""
 
 from __future__ import annotations
 
@@ -14,17 +14,7 @@ from mesoslip.errors import ConfigError, MesoslipError
 def parser_of(
     description: str | None, known: Iterable[str], what: str, output: str, default: Path | None
 ) -> argparse.ArgumentParser:
-    """A parser of the arguments of a script.
-
-    Parameters
-    ----------
-    description
-        What the script does.
-    known, what
-        Names of what it makes, and what they are names of.
-    output, default
-        What it writes, and where by default.
-    """
+    """A parser of the arguments of a script: the known names of its products, and its output."""
     parser = argparse.ArgumentParser(description=description)
     names = f"{what}s; all by default: {', '.join(known)}"
     parser.add_argument("names", nargs="*", metavar="NAME", help=names)
@@ -44,7 +34,7 @@ def parser_of(
 
 @contextmanager
 def reporting_mistakes() -> Iterator[None]:
-    """Report a mistake in one line, and exit: 2 for a wrong name, 1 for what cannot be read."""
+    """Report a mistake in one line, and exit: 2 for a wrong name, 1 for a missing output."""
     try:
         yield
     except MesoslipError as error:

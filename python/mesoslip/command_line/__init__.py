@@ -2,5 +2,5 @@
 
 import os
 
-# Before NumPy is loaded: matrices are small here, and threads that wait for more take a core each.
+# Before NumPy is loaded: matrices are small here, and each waiting thread would take a core.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")

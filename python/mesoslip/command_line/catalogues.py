@@ -16,6 +16,7 @@ from mesoslip.command_line.options import (
     show,
     show_all,
     time_of,
+    write_table,
 )
 from mesoslip.quantities import column, with_error
 
@@ -28,17 +29,13 @@ def slips(
     """Print the catalogue of slips, with statistics."""
     from mesoslip.analysis import slips as catalogues
     from mesoslip.output import files, targets
-    from mesoslip.output.table_files import is_printed, write_printed
 
     if table is not None:
         targets.check_writable(table, [output])
     with files.opened_arrays(output) as tree:
         catalogue, counts = catalogues.catalogue_of(tree), catalogues.counts(tree)
     for_print = catalogue.printed()
-    if table is not None and is_printed(table):
-        write_printed([for_print], table)
-    elif table is not None:
-        catalogue.write_csv(table)
+    write_table(table, lambda: [for_print], catalogue.write_csv)
     rows = catalogue.rows
     if as_json:
         answer = {"slips": rows, "statistics": catalogue.statistics}
@@ -55,7 +52,7 @@ def slips(
 
 
 def _print_counts(counts: dict[str, Any], unit: str) -> None:
-    """How the number of slips depends on the minimum fall, with a warning if it does everywhere."""
+    """Print the number of slips over the minimum fall, with a warning if it has no plateau."""
     if not counts["min_fall"]:
         return
     falls = column(counts["min_fall"], unit, 3)
@@ -105,27 +102,26 @@ def avalanches(
     from mesoslip.analysis import avalanches as avalanche_catalogue
     from mesoslip.analysis.avalanche_sizes import ccdf, logarithmic_bins
     from mesoslip.output import files, targets
-    from mesoslip.output.table_files import is_printed, write_printed
 
     if table is not None:
         targets.check_writable(table, [output])
     tree = files.read_run(output)
     start = time_of(after, "--after")
     data = avalanche_catalogue.avalanches(tree, after=start, min_force_ratio=min_force_ratio)
-    if table is not None and is_printed(table):
-        write_printed([avalanche_catalogue.printed(data)], table)
-    elif table is not None:
-        avalanche_catalogue.write_csv(data, table)
+    write_table(
+        table,
+        lambda: [avalanche_catalogue.printed(data)],
+        lambda file: avalanche_catalogue.write_csv(data, file),
+    )
     statistics = avalanche_catalogue.avalanche_summary(
         tree, after=start, min_force_ratio=min_force_ratio, min_size=min_size
     )
     bins = logarithmic_bins(data["size"].values)
-    columns = (bins.edges[:, 0] + 0.5, bins.edges[:, 1] - 0.5, bins.count)
+    ends = bins.edges[:, 0] + 0.5, bins.edges[:, 1] - 0.5
+    columns = (*ends, bins.count, bins.density.tolist(), bins.density_error.tolist())
     distribution = [
         {"from": int(low), "to": int(high), "count": int(count), "density": density, "error": error}
-        for low, high, count, density, error in zip(
-            *columns, bins.density.tolist(), bins.density_error.tolist(), strict=True
-        )
+        for low, high, count, density, error in zip(*columns, strict=True)
     ]
     if as_json:
         sizes, part = ccdf(data["size"].values)
@@ -133,20 +129,11 @@ def avalanches(
         answer = {"statistics": statistics, "distribution": distribution, "ccdf": cumulative}
         print_json(answer)
         return
-    print_table(
-        [
-            ["size from", "to", "count", "probability P(s)"],
-            *(
-                [
-                    str(one["from"]),
-                    str(one["to"]),
-                    str(one["count"]),
-                    with_error(one["density"], one["error"]),
-                ]
-                for one in distribution
-            ),
-        ]
-    )
+    rows = [["size from", "to", "count", "probability P(s)"]]
+    for one in distribution:
+        counts = [str(one[name]) for name in ("from", "to", "count")]
+        rows.append([*counts, with_error(one["density"], one["error"])])
+    print_table(rows)
     show_all(statistics, avalanche_catalogue.SUMMARY)
     warning = avalanche_catalogue.warning(statistics)
     if warning is not None:
@@ -170,9 +157,7 @@ def regime(output: OutputArgument, as_json: JsonOption = False) -> None:
         return
     if motion is not None:
         typer.echo(f"a slider under a force has no cycles; in its last stage it {motion}")
-        typer.echo(
-            "Under a force there are no cycles: mesoslip response prints creep and static friction."
-        )
+        typer.echo("mesoslip response prints creep and static friction")
         return
     for index, one in zip(realizations, results, strict=True):
         if len(results) > 1:

@@ -12,8 +12,10 @@ import typer
 from mesoslip.command_line.options import (
     ConfigArgument,
     JsonOption,
+    QuietOption,
     SetOption,
     load,
+    output_option,
     print_caveat,
     print_json,
     print_table,
@@ -28,18 +30,6 @@ if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
     from mesoslip.cycles.cycle_result import Cycle
 
-StartOption = Annotated[
-    str | None,
-    typer.Option(
-        "--start",
-        help="Where to start: relaxed, steady, uniform, or an output of this command; by default "
-        "contacts.initial",
-        metavar="START",
-    ),
-]
-
-# Parts of FROM:TO:POINTS.
-SPAN_PARTS = 3
 # Significant digits.
 DIGITS = 5
 # Meanings for a motion that is irregular.
@@ -52,11 +42,15 @@ IRREGULAR = {
 
 def cycle(
     config: ConfigArgument,
-    output: Annotated[
-        Path | None,
-        typer.Option("-o", "--output", help="Write the cycle to a file", metavar="OUT.nc"),
+    output: Annotated[Path | None, output_option("Write the cycle to a file")] = None,
+    start: Annotated[
+        str | None,
+        typer.Option(
+            help="Where to start: relaxed, steady, uniform, or an output of this command; by "
+            "default contacts.initial",
+            metavar="START",
+        ),
     ] = None,
-    start: StartOption = None,
     continued: Annotated[
         str | None,
         typer.Option(
@@ -68,7 +62,7 @@ def cycle(
     ] = None,
     changes: SetOption = None,
     as_json: JsonOption = False,
-    quiet: Annotated[bool, typer.Option("--quiet", help="Show no progress")] = False,
+    quiet: QuietOption = False,
 ) -> None:
     """Compute the settled cycle of the master equation, and which motions are possible."""
     from mesoslip.cycles.cycle import cycle as settled_cycle
@@ -100,7 +94,7 @@ def _follow(
     as_json: bool,
     quiet: bool,
 ) -> None:
-    """Follow the motion over a key; write and print its branches."""
+    """Follow the motion over a key, and write and print its branches."""
     import xarray as xr
 
     from mesoslip.cycles.branch import branches
@@ -133,7 +127,7 @@ def _values(text: str) -> tuple[str, list[float]]:
     if near:
         message = f"has an unknown key; did you mean {near[0]!r}?"
         raise ConfigError([Problem("", "--continue", message, text)])
-    if kind is None or len(parts) != SPAN_PARTS or not parts[2].isdigit() or int(parts[2]) < 2:
+    if kind is None or len(parts) != 3 or not parts[2].isdigit() or int(parts[2]) < 2:
         message = "must be KEY=FROM:TO:POINTS, such as drive.velocity=0.1um/s:10um/s:20"
         raise ConfigError([Problem("", "--continue", message, text)])
     low, high = (
@@ -192,6 +186,6 @@ def _print(found: Cycle) -> None:
         meaning = IRREGULAR.get(name, usual) if found.motion == "irregular" else usual
         show(name, value, *meaning, digits=DIGITS)
     typer.echo(found.verdict)
-    counted = f"{found.cycles} passages computed, by {found.solver}"
+    work = f"{found.cycles} passages computed, by {found.solver}"
     error = f"; relative error of period and peaks {found.error:.1g}" if found.error > 0 else ""
-    typer.echo(f"{counted}{error}", err=not sys.stdout.isatty())
+    typer.echo(f"{work}{error}", err=not sys.stdout.isatty())

@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from mesoslip.command_line.options import output_option
+
 
 def example(
     name: Annotated[
@@ -16,8 +18,7 @@ def example(
         ),
     ] = None,
     file: Annotated[
-        Path | None,
-        typer.Option("-o", "--output", help="File; NAME.toml here by default", metavar="FILE"),
+        Path | None, output_option("File; by default NAME.toml in this folder", "FILE")
     ] = None,
 ) -> None:
     """List the example configurations, or write one to start from."""

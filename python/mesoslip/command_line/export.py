@@ -7,18 +7,15 @@ from typing import Annotated
 
 import typer
 
-from mesoslip.command_line.options import OutputArgument
+from mesoslip.command_line.options import OutputArgument, output_option
 
 
 def export(
     output: OutputArgument,
     file: Annotated[
         Path,
-        typer.Option(
-            "-o",
-            "--output",
-            help="Folder NAME.zarr for the whole output, or NAME.xml for slips as QuakeML",
-            metavar="FILE",
+        output_option(
+            "Folder NAME.zarr for the whole output, or NAME.xml for slips as QuakeML", "FILE"
         ),
     ],
 ) -> None:

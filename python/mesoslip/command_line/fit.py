@@ -10,9 +10,12 @@ import typer
 
 from mesoslip.command_line.options import (
     JsonOption,
+    QuietOption,
     SetOption,
+    output_option,
     print_json,
     print_table,
+    workers_option,
 )
 from mesoslip.command_line.progress import progress_shown, say
 from mesoslip.execution.stop import StoppedError, stopped_by_signals
@@ -21,6 +24,12 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from mesoslip.inference.posterior import Row
+
+
+HEAD = (
+    *("parameter", "median", "50 % interval", "90 % interval", "unit"),
+    *("verdict", "shrinkage", "follows from"),
+)
 
 
 def fit(
@@ -35,12 +44,7 @@ def fit(
     ],
     posterior: Annotated[
         Path | None,
-        typer.Option(
-            "-o",
-            "--output",
-            help="Posterior file; out/<stem>.posterior.nc by default",
-            metavar="POSTERIOR.nc",
-        ),
+        output_option("Posterior file; out/<stem>.posterior.nc by default", "POSTERIOR.nc"),
     ] = None,
     changes: SetOption = None,
     predict: Annotated[
@@ -55,11 +59,8 @@ def fit(
         bool,
         typer.Option("--compare", help="Compare fits of the same traces by their predictions"),
     ] = False,
-    workers: Annotated[
-        int | None,
-        typer.Option(min=1, help="Parallel simulations; the number of processors by default"),
-    ] = None,
-    quiet: Annotated[bool, typer.Option("--quiet", help="Print no progress")] = False,
+    workers: Annotated[int | None, workers_option("simulations")] = None,
+    quiet: QuietOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Fit parameters of the model to traces of one interface, with their uncertainty.
@@ -135,7 +136,7 @@ def _predict(
             raise typer.Exit(stop.exit_status) from None
     writing.write(tree, path)
     probability = tree.attrs["agreement_probability"]
-    notes = [one for one in str(tree.attrs["warnings"]).split("\n") if one]
+    notes = _lines(tree, "warnings")
     if as_json:
         print_json({"agreement_probability": probability, "warnings": notes})
         return
@@ -174,8 +175,7 @@ def _print(tree: xr.DataTree, *, as_json: bool) -> None:
     from mesoslip.inference.posterior import table
 
     rows = table(tree)
-    notes = [one for one in str(tree.attrs["warnings"]).split("\n") if one]
-    remarks = [one for one in str(tree.attrs["notes"]).split("\n") if one]
+    warnings, notes = _lines(tree, "warnings"), _lines(tree, "notes")
     if as_json:
         print_json(
             {
@@ -193,26 +193,24 @@ def _print(tree: xr.DataTree, *, as_json: bool) -> None:
                     for row in rows
                 },
                 "agreement_probability": tree.attrs["agreement_probability"],
-                "warnings": notes,
-                "notes": remarks,
+                "warnings": warnings,
+                "notes": notes,
             }
         )
         return
     _print_rows(rows, tree.attrs)
-    for one in remarks:
-        typer.echo(one)
     for one in notes:
+        typer.echo(one)
+    for one in warnings:
         typer.echo(f"warning: {one}")
 
 
-def check_arguments(traces: Sequence[Path], config: Path) -> None:
-    """Check that traces and a configuration are given, in this order.
+def _lines(tree: xr.DataTree, attribute: str) -> list[str]:
+    return [one for one in str(tree.attrs[attribute]).split("\n") if one]
 
-    Raises
-    ------
-    FileError
-        If they are not.
-    """
+
+def check_arguments(traces: Sequence[Path], config: Path) -> None:
+    """Check that traces and a configuration are given, in this order."""
     from mesoslip.errors import FileError
 
     if config.suffix == ".nc":
@@ -222,21 +220,10 @@ def check_arguments(traces: Sequence[Path], config: Path) -> None:
 
 
 def _print_rows(rows: Sequence[Row], attributes: Mapping[Any, Any]) -> None:
-    """A line for each parameter, in a unit that suits its median."""
+    """Print a line for each parameter, in a unit that suits its median."""
     from mesoslip.quantities import scale_for, with_unit
 
-    cells = [
-        [
-            "parameter",
-            "median",
-            "50 % interval",
-            "90 % interval",
-            "unit",
-            "verdict",
-            "shrinkage",
-            "follows from",
-        ]
-    ]
+    cells = [list(HEAD)]
     for row in rows:
         scale = scale_for(row.percentiles[2], row.unit)
         low, lower, middle, upper, high = (

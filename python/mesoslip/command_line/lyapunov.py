@@ -10,8 +10,10 @@ import typer
 from mesoslip.command_line.options import (
     ConfigArgument,
     JsonOption,
+    QuietOption,
     SetOption,
     load,
+    output_option,
     print_json,
     quantity_or_none,
     show_all,
@@ -21,10 +23,7 @@ from mesoslip.command_line.progress import progress_shown
 
 def lyapunov(
     config: ConfigArgument,
-    output: Annotated[
-        Path | None,
-        typer.Option("-o", "--output", help="Write distances and peaks", metavar="OUT.nc"),
-    ] = None,
+    output: Annotated[Path | None, output_option("Write distances and peaks")] = None,
     changes: SetOption = None,
     twins: Annotated[int, typer.Option(help="Number of twins")] = 8,
     follow: Annotated[
@@ -33,7 +32,7 @@ def lyapunov(
     ] = None,
     workers: Annotated[int | None, typer.Option(help="Twins at the same time")] = None,
     as_json: JsonOption = False,
-    quiet: Annotated[bool, typer.Option("--quiet", help="Show no progress")] = False,
+    quiet: QuietOption = False,
 ) -> None:
     """Estimate the largest Lyapunov exponent: whether an irregular motion is chaos.
 

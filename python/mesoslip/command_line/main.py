@@ -57,7 +57,7 @@ COMMANDS = (
     example.example,
 )
 
-# Those that never import xarray, or only for what they are asked to open.
+# Commands that import xarray only for outputs that need it.
 WITHOUT_XARRAY = {
     run.run,
     theory.curve,
@@ -93,7 +93,7 @@ def _common(
 
 
 def _with_numpy_only(command: Callable[..., None]) -> Callable[..., None]:
-    """A command in whose process xarray uses arrays of NumPy only."""
+    """A command with xarray imported without packages of other arrays."""
 
     @functools.wraps(command)
     def run(*arguments: Any, **options: Any) -> None:
@@ -126,7 +126,7 @@ app = application(COMMANDS)
 
 
 def _asked(arguments: Sequence[str]) -> typer.Typer:
-    """The command line with the command that is asked for, as all of them take time to build."""
+    """The command line with only the command that is asked for, which is quicker to build."""
     named = [one for one in COMMANDS if one.__name__.replace("_", "-") in arguments[:1]]
     return application(named) if named else app
 
@@ -134,7 +134,7 @@ def _asked(arguments: Sequence[str]) -> typer.Typer:
 def main() -> None:
     """Run the command line and exit."""
     _open_streams()
-    # A character that no font has is drawn as a box, which is enough of a warning.
+    # A character that no font has is drawn as a box.
     warnings.filterwarnings("ignore", r"Glyph \d+ .*missing from", UserWarning)
     typed = shlex.join(["mesoslip", *sys.argv[1:]])
     # Outputs contain the command line, and take UTF-8 only.
@@ -150,7 +150,7 @@ def main() -> None:
     except KeyboardInterrupt:
         status = run.INTERRUPTED
     except ImportError as error:
-        # A shared library of the kernels; other missing modules are bugs.
+        # The kernels lack a shared library; other missing modules are bugs.
         if "shared object" not in str(error) and "Library not loaded" not in str(error):
             raise
         typer.echo(f"mesoslip: a library is missing: {error}; {LIBRARIES}", err=True)
@@ -170,10 +170,10 @@ def main() -> None:
 
 
 def _open_streams() -> None:
-    """Open standard streams that are closed, and let stdout print any file name."""
+    """Open standard streams that are closed, and let stdout print all file names."""
     for number, name in enumerate(("stdin", "stdout", "stderr")):
         if getattr(sys, name) is None:
-            # The lowest free descriptor is used, which is that of the stream.
+            # The lowest free descriptor, which is used, is that of the stream.
             os.open(os.devnull, os.O_RDWR)
             setattr(sys, name, os.fdopen(number, "w" if number else "r", closefd=False))
     if isinstance(sys.stdout, io.TextIOWrapper):
@@ -181,7 +181,7 @@ def _open_streams() -> None:
 
 
 def _output_failed(error: OSError) -> int:
-    """Report that stdout cannot be written to, and redirect it to nowhere."""
+    """Report that stdout cannot be written, and discard the rest."""
     typer.echo(f"mesoslip: the output cannot be written: {error.strerror or error}", err=True)
     with suppress(OSError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)

@@ -12,6 +12,7 @@ from mesoslip.command_line.options import (
     JsonOption,
     SetOption,
     load,
+    output_option,
     print_json,
     show,
 )
@@ -21,11 +22,9 @@ def mean_field(
     config: ConfigArgument,
     output: Annotated[
         Path | None,
-        typer.Option(
-            "-o",
-            "--output",
-            help="Write a configuration of the master equation, and its table beside it as CSV",
-            metavar="OUT.toml",
+        output_option(
+            "Write a configuration of the master equation, and its table beside it as CSV",
+            "OUT.toml",
         ),
     ] = None,
     first: Annotated[

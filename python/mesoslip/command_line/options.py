@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -13,6 +13,23 @@ import typer
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
     from mesoslip.execution.executors import ExecutorLike
+    from mesoslip.output.table_files import PrintedTable
+
+
+def output_option(help_text: str, metavar: str = "OUT.nc") -> typer.models.OptionInfo:
+    """The option of the file that a command writes."""
+    option: typer.models.OptionInfo = typer.Option(
+        "-o", "--output", help=help_text, metavar=metavar
+    )
+    return option
+
+
+def workers_option(parallel: str) -> typer.models.OptionInfo:
+    """The option of a number of workers, with the name of what they do at the same time."""
+    help_text = f"Parallel {parallel}; the number of processors by default"
+    option: typer.models.OptionInfo = typer.Option(min=1, help=help_text)
+    return option
+
 
 ConfigArgument = Annotated[
     str, typer.Argument(help="TOML file, or an output to repeat", metavar="CONFIG")
@@ -21,6 +38,7 @@ OutputArgument = Annotated[Path, typer.Argument(help="Output of mesoslip", metav
 OutputsArgument = Annotated[
     list[Path], typer.Argument(help="Outputs of mesoslip", metavar="OUT.nc...")
 ]
+SavedOption = Annotated[Path | None, output_option("Output file; out/<stem>.nc by default")]
 SetOption = Annotated[
     list[str] | None,
     typer.Option(
@@ -57,16 +75,11 @@ TableOption = Annotated[
     ),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON, in SI units")]
+QuietOption = Annotated[bool, typer.Option("--quiet", help="Print no progress")]
 
 
 def load(config: str, changes: Iterable[str] | None) -> Config:
-    """A configuration with changes. Dropped keys of another kind of slider are reported on stderr.
-
-    Raises
-    ------
-    FileError, ConfigError
-        If it cannot be read or is wrong.
-    """
+    """A configuration with changes. Keys that its kind of slider drops are reported on stderr."""
     from mesoslip.output.inputs import as_config
 
     checked = as_config(config, changes or ())
@@ -79,13 +92,7 @@ def load(config: str, changes: Iterable[str] | None) -> Config:
 def executor_of(
     workers: int | None, scheduler: str | None = None, pool: str | None = None
 ) -> ExecutorLike:
-    """The executor that options name; the default of the command without them.
-
-    Raises
-    ------
-    ConfigError
-        If there is no such pool, or options contradict each other.
-    """
+    """The executor that options name; without them the default of the command."""
     from mesoslip.errors import ConfigError, Problem
     from mesoslip.execution.executors import Dask, Processes, Threads, ThreadsThenProcesses
 
@@ -105,8 +112,7 @@ def show(
     error: float | bool | None = None,
     digits: int = 6,
 ) -> None:
-    """A line for a quantity in SI, in a suitable unit, with its error if that is known; without one
-    the number has as many significant digits as ``digits`` states."""
+    """Print a quantity in SI in a suitable unit, with its error or a number of digits."""
     from mesoslip.quantities import with_error, with_unit
 
     if isinstance(value, bool) or value is None:
@@ -123,15 +129,8 @@ def show(
 def show_all(
     values: Mapping[str, float | bool | None], meanings: Mapping[str, tuple[str, str]]
 ) -> None:
-    """A line for each quantity, which has its error beside it if there is one.
-
-    Parameters
-    ----------
-    values
-        Quantities in SI by name; the error of ``name`` is ``name_error``.
-    meanings
-        Their units and meanings.
-    """
+    """Print quantities in SI by name, with their units and meanings; the error of ``name`` is
+    ``name_error``."""
     for name, value in values.items():
         if name.removesuffix("_error") != name and name.removesuffix("_error") in values:
             continue
@@ -139,13 +138,27 @@ def show_all(
 
 
 def print_table(rows: Sequence[Sequence[str]], notes: Sequence[str] = ()) -> None:
-    """Print rows of cells, right-aligned; the note on a row stands below it."""
+    """Print rows of cells, right-aligned, with the note on a row below it."""
     widths = [max(map(len, cells)) for cells in zip(*rows, strict=True)]
     for row, note in zip(rows, notes or [""] * len(rows), strict=True):
         line = "  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True))
         typer.echo(line)
         if note:
             typer.echo(f"{'':{len(line)}}{note}")
+
+
+def write_table(
+    file: Path | None,
+    printed: Callable[[], Sequence[PrintedTable]],
+    write_csv: Callable[[Path], None],
+) -> None:
+    """Write tables to the file of a `TableOption`, as its ending says."""
+    from mesoslip.output.table_files import is_printed, write_printed
+
+    if file is not None and is_printed(file):
+        write_printed(printed(), file)
+    elif file is not None:
+        write_csv(file)
 
 
 def counted(count: float, noun: str) -> str:
@@ -177,13 +190,7 @@ def quantity(
     positive: bool = False,
     negative: bool = True,
 ) -> float:
-    """The value of an option that is a quantity, in SI.
-
-    Raises
-    ------
-    ConfigError
-        If it is not a quantity of the unit's dimension, or has the wrong sign.
-    """
+    """The value of an option that is a quantity, in SI."""
     from mesoslip.configuration.units import to_si
     from mesoslip.errors import ConfigError, Problem
 
@@ -211,7 +218,7 @@ def _number_or_text(text: str) -> float | str:
 def quantity_or_none(
     text: str | None, option: str, unit: str, example: str, *, positive: bool = False
 ) -> float | None:
-    """The value of an option that is a quantity, in SI; None without it. See `quantity`."""
+    """The value of an option that is a quantity, in SI; None without it."""
     return None if text is None else quantity(text, option, unit, example, positive=positive)
 
 

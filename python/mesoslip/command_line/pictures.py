@@ -11,7 +11,12 @@ import typer
 from typer.core import TyperCommand, TyperOption
 
 from mesoslip.array_packages import hidden
-from mesoslip.command_line.options import OutputsArgument, quantity_or_none, time_of
+from mesoslip.command_line.options import (
+    OutputsArgument,
+    output_option,
+    quantity_or_none,
+    time_of,
+)
 
 # Endings of pictures and movies.
 FORMATS = (".png", ".pdf", ".svg", ".eps", ".ps", ".jpg", ".tif", ".webp", ".gif", ".mp4")
@@ -30,7 +35,6 @@ class PlotCommand(TyperCommand):
                 option.help = f"{VIEW_HELP}. {summary_of_views()}"
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
-        """Write the help."""
         self.complete_help()
         super().format_help(ctx, formatter)
 
@@ -47,20 +51,9 @@ def plot(
     outputs: OutputsArgument,
     figure: Annotated[
         Path | None,
-        typer.Option(
-            "-o",
-            "--output",
-            help="Picture, beside the first output by default; .gif, .mp4: a movie",
-            metavar="FIG",
-        ),
+        output_option("Picture, beside the first output by default; .gif, .mp4: a movie", "FIG"),
     ] = None,
-    view: Annotated[
-        str | None,
-        typer.Option(
-            help=VIEW_HELP,
-            metavar="VIEW",
-        ),
-    ] = None,
+    view: Annotated[str | None, typer.Option(help=VIEW_HELP, metavar="VIEW")] = None,
     snapshot: Annotated[
         int | None,
         typer.Option(
@@ -153,22 +146,15 @@ def plot(
 
 
 def _path(picture: Path | None, output: Path, file_format: str | None) -> Path:
-    """The file of a picture: by default beside the output, a .png unless there is a format.
-
-    Raises
-    ------
-    ConfigError
-        If the format is not that of the file.
-    """
+    """The file of a picture in a format, .png by default; by default it is beside the output."""
     from mesoslip.errors import ConfigError, Problem
 
     ending = f".{(file_format or 'png').lower().removeprefix('.')}"
     if picture is None:
         return output.parent / f"{output.stem or 'output'}{ending}"
-    known = picture.suffix.lower() in FORMATS
     if file_format is None or picture.suffix.lower() == ending:
         return picture
-    if known:
+    if picture.suffix.lower() in FORMATS:
         text = f"is not the format of {picture.name}"
         raise ConfigError([Problem("", "--format", text, file_format)])
     return picture.with_name(f"{picture.name}{ending}")

@@ -7,16 +7,13 @@ from typing import Annotated
 
 import typer
 
-from mesoslip.command_line.options import OutputsArgument
+from mesoslip.command_line.options import OutputsArgument, output_option
 
 
 def report(
     outputs: OutputsArgument,
     page: Annotated[
-        Path | None,
-        typer.Option(
-            "-o", "--output", help="Page; beside the first output by default", metavar="FILE.html"
-        ),
+        Path | None, output_option("Page; beside the first output by default", "FILE.html")
     ] = None,
 ) -> None:
     """Write a self-contained page about outputs of one command."""

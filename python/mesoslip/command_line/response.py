@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -13,10 +13,8 @@ from mesoslip.command_line.options import (
     print_json,
     print_table,
     quantity_or_none,
+    write_table,
 )
-
-if TYPE_CHECKING:
-    from mesoslip.analysis.response import ResponseTable
 
 
 def response(
@@ -28,8 +26,7 @@ def response(
     normal_force: Annotated[
         str | None,
         typer.Option(
-            help="Normal force for friction coefficients, such as '10 mN'",
-            metavar="FORCE",
+            help="Normal force for friction coefficients, such as '10 mN'", metavar="FORCE"
         ),
     ] = None,
     fit: Annotated[bool, typer.Option(help="Fit rate-and-state parameters")] = True,
@@ -57,16 +54,13 @@ def response(
         write_csv,
     )
     from mesoslip.output import targets
-    from mesoslip.output.table_files import is_printed, latex, markdown, write_printed
+    from mesoslip.output.table_files import latex, markdown
 
     scale = quantity_or_none(normal_force, "--normal-force", "N", "10 mN", positive=True)
     if table is not None:
         targets.check_writable(table, outputs)
     tree = response_arrays(outputs, normal_force=scale, with_fit=fit, free_stiffness=free_stiffness)
-    if table is not None and is_printed(table):
-        write_printed(tables(tree), table)
-    elif table is not None:
-        write_csv(tree, table)
+    write_table(table, lambda: tables(tree), lambda file: write_csv(tree, file))
     if as_json:
         groups = {str(name): rows_of(tree, str(name)) for name in tree.children}
         scalars = {key: value for group in groups for key, value in scalars_of(tree, group).items()}
@@ -81,12 +75,7 @@ def response(
         return
     typer.echo(force_scale(tree))
     for one in tables(tree):
-        _print(one)
-
-
-def _print(table: ResponseTable) -> None:
-    """Print a table; the note on a row stands below it."""
-    typer.echo(f"\n{table.title}")
-    print_table((table.head, *table.rows), ("", *table.notes))
-    if table.line:
-        typer.echo(table.line)
+        typer.echo(f"\n{one.title}")
+        print_table((one.head, *one.rows), ("", *one.notes))
+        if one.line:
+            typer.echo(one.line)

@@ -11,12 +11,14 @@ import typer
 
 from mesoslip.command_line.options import (
     ConfigArgument,
+    SavedOption,
     SchedulerOption,
     SetOption,
     counted,
     executor_of,
     load,
     quantity,
+    workers_option,
 )
 from mesoslip.command_line.progress import progress_shown, say
 from mesoslip.errors import FileError
@@ -35,12 +37,7 @@ MAX_ROWS = 400_000
 
 def run(
     config: ConfigArgument,
-    output: Annotated[
-        Path | None,
-        typer.Option(
-            "-o", "--output", help="Output file; out/<stem>.nc by default", metavar="OUT.nc"
-        ),
-    ] = None,
+    output: SavedOption = None,
     changes: SetOption = None,
     resume: Annotated[
         bool,
@@ -56,10 +53,7 @@ def run(
             metavar="TIME",
         ),
     ] = "60 s",
-    workers: Annotated[
-        int | None,
-        typer.Option(min=1, help="Parallel realizations; the number of processors by default"),
-    ] = None,
+    workers: Annotated[int | None, workers_option("realizations")] = None,
     scheduler: SchedulerOption = None,
     quiet: Annotated[
         bool, typer.Option("--quiet", help="Print neither progress nor results")
@@ -89,14 +83,9 @@ def run(
         report(
             "the output of another configuration will be replaced at the end; -o gives another name"
         )
+    folder = checkpoint_folder(path)
     with (
-        Checkpoint(
-            checkpoint_folder(path),
-            checked,
-            interval=interval,
-            resume=resume,
-            report=report,
-        ) as checkpoint,
+        Checkpoint(folder, checked, interval=interval, resume=resume, report=report) as checkpoint,
         stopped_by_signals() as stop,
     ):
         with progress_shown(quiet) as progress:
@@ -129,7 +118,7 @@ def _partial(path: Path) -> Path:
 
 
 def _keep(results: Results, path: Path, stop: Stop, checkpoint: Checkpoint) -> int:
-    """Report what is kept of a stopped run; the exit status."""
+    """Keep the results of a stopped run, and report where; returns the exit status."""
     import signal
 
     from mesoslip.output import layout, writing
@@ -138,7 +127,7 @@ def _keep(results: Results, path: Path, stop: Stop, checkpoint: Checkpoint) -> i
     is_kept = checkpoint.saved_time is not None
     if is_kept:
         message += "; the same command with --resume continues from the checkpoint"
-    # At a shutdown there is no time for a file that the checkpoint makes superfluous.
+    # At a shutdown there is no time for a file, and the checkpoint has the results.
     if stop.signal in {None, signal.SIGINT} or not is_kept:
         try:
             writing.write_results(results, _partial(path))
@@ -207,8 +196,8 @@ def _mean_velocity(results: Results, config: Config) -> str:
 
 
 def _unreached_conditions(results: Results, config: Config) -> str:
-    """A message about conditions that should have ended the run before its drive did; empty if
-    one of them did in every realization."""
+    """A message about conditions that did not end the run before its drive ended; empty if one of
+    them ended every realization."""
     from mesoslip.quantities import with_unit
     from mesoslip.simulation.realization import ENDINGS
 

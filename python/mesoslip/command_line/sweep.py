@@ -9,10 +9,13 @@ import typer
 
 from mesoslip.command_line.options import (
     PoolOption,
+    QuietOption,
+    SavedOption,
     SchedulerOption,
     SetOption,
     counted,
     executor_of,
+    workers_option,
 )
 from mesoslip.command_line.progress import progress_shown, say
 from mesoslip.errors import WriteError
@@ -30,24 +33,16 @@ FAILED = 1
 
 def sweep(
     file: Annotated[Path, typer.Argument(help="TOML file of a sweep", metavar="SWEEP.toml")],
-    output: Annotated[
-        Path | None,
-        typer.Option(
-            "-o", "--output", help="Output file; out/<stem>.nc by default", metavar="OUT.nc"
-        ),
-    ] = None,
+    output: SavedOption = None,
     changes: SetOption = None,
-    workers: Annotated[
-        int | None,
-        typer.Option(min=1, help="Parallel points; the number of processors by default"),
-    ] = None,
+    workers: Annotated[int | None, workers_option("points")] = None,
     scheduler: SchedulerOption = None,
     dry_run: Annotated[
         bool,
         typer.Option("--dry-run", help="Estimate time, memory and disk space, and run nothing"),
     ] = False,
     pool: PoolOption = None,
-    quiet: Annotated[bool, typer.Option("--quiet", help="Print no progress")] = False,
+    quiet: QuietOption = False,
 ) -> None:
     """Run a configuration over ranges of parameters.
 
@@ -74,13 +69,7 @@ def sweep(
     with Store(folder, "points") as store, stopped_by_signals() as stop:
         try:
             with progress_shown(quiet) as progress:
-                done = run_sweep(
-                    plan,
-                    store=store,
-                    executor=executor,
-                    progress=progress,
-                    stop=stop,
-                )
+                done = run_sweep(plan, store=store, executor=executor, progress=progress, stop=stop)
         except WriteError as error:
             kept = len(store.names())
             stored = f"{counted(kept, 'point')} {'is' if kept == 1 else 'are'} stored"
@@ -92,7 +81,7 @@ def sweep(
 
 
 def _write(done: Sweep, path: Path, stop: Stop) -> int:
-    """Write the dataset, under another name if points are missing; the exit status."""
+    """Write the dataset, under another name if points are missing; returns the exit status."""
     import xarray as xr
 
     from mesoslip.output import files, writing

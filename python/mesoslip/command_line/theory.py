@@ -14,6 +14,7 @@ from mesoslip.command_line.options import (
     JsonOption,
     SetOption,
     load,
+    output_option,
     print_caveat,
     print_json,
     show,
@@ -23,8 +24,8 @@ if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
     from mesoslip.theory.force_curve import ForceCurve
 
-# Significant digits of what follows from keys, which have two to four themselves; of what is
-# computed, if its error allows; and of errors. `--json` has all digits.
+# Significant digits of quantities derived from keys, which have two to four themselves; of computed
+# quantities whose errors allow them; and of errors. `--json` has all digits.
 DERIVED_DIGITS = 4
 COMPUTED_DIGITS = 5
 ERROR_DIGITS = 2
@@ -32,7 +33,6 @@ ERROR_DIGITS = 2
 OF_SLOPE = frozenset({"K_star", "D2", "D3"})
 
 LIMITS_HEADER = "spring stiffer than"
-
 # Maximum work for the stability of steady sliding, some seconds.
 MAX_WORK = 400_000
 
@@ -60,10 +60,7 @@ def info(config: ConfigArgument, changes: SetOption = None, as_json: JsonOption 
 
 def curve(
     config: ConfigArgument,
-    output: Annotated[
-        Path | None,
-        typer.Option("-o", "--output", help="Write the curve to a file", metavar="OUT.nc"),
-    ] = None,
+    output: Annotated[Path | None, output_option("Write the curve to a file")] = None,
     changes: SetOption = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -123,10 +120,7 @@ def curve(
 
 def onset(
     config: ConfigArgument,
-    output: Annotated[
-        Path | None,
-        typer.Option("-o", "--output", help="Write the solutions to a file", metavar="OUT.nc"),
-    ] = None,
+    output: Annotated[Path | None, output_option("Write the solutions to a file")] = None,
     changes: SetOption = None,
     as_json: JsonOption = False,
 ) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mesoslip.command_line.options import counted
+from mesoslip.command_line.options import SavedOption, counted
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -27,12 +27,7 @@ def trace(
             help="File of the measurement, or an EXPERIMENT.toml that names it", metavar="FILE"
         ),
     ],
-    output: Annotated[
-        Path | None,
-        typer.Option(
-            "-o", "--output", help="Output file; out/<stem>.nc by default", metavar="OUT.nc"
-        ),
-    ] = None,
+    output: SavedOption = None,
     config: Annotated[
         str | None,
         typer.Option(
@@ -85,7 +80,7 @@ def trace(
         int | None,
         typer.Option(
             min=1,
-            help="Which part of a file whose clock starts again; the longest by default",
+            help="Which part of a file whose clock restarts; the longest by default",
             metavar="NUMBER",
         ),
     ] = None,
@@ -134,7 +129,7 @@ def trace(
 
 
 def _summary(tree: xr.DataTree) -> list[str]:
-    """Short description of an output."""
+    """A short description of an output."""
     from mesoslip.quantities import with_unit
 
     time, known = tree.to_dataset()["time"].values, tree.attrs

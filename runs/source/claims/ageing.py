@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from claims.base import Claim, Finding, measured, verdict
+from claims.base import Finding, claim, measured, verdict
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -21,8 +21,15 @@ STICK_SLIP, SMOOTH = 0.1, 0.02
 IRREGULAR = 0.1
 
 
+@claim(
+    "C21",
+    "ageing turns stick-slip into smooth sliding as v_d grows",
+    "in every realization the amplitude of the spring force is more than 0.1 of F_s at the "
+    "lowest velocity and less than 0.02 at the highest, and without ageing more than 0.1 at "
+    "all; for some damping, with a qualification unless for each",
+    ("claims/sweeps/ageing",),
+)
 def smoother(trees: Sequence[xr.DataTree]) -> Finding:
-    """C21: ageing turns stick-slip into smooth sliding as v_d grows."""
     (tree,) = trees
     data = tree.to_dataset()
     amplitudes = data["relative_amplitude"].transpose(
@@ -49,8 +56,16 @@ def smoother(trees: Sequence[xr.DataTree]) -> Finding:
     )  # fmt: skip
 
 
+@claim(
+    "C22",
+    "irregular motion lies between stick-slip and smooth sliding for some parameters",
+    "with both numbers of contacts, in every realization: peaks of slips vary by less than a "
+    "tenth at the lowest velocity, peaks and falls by more at the middle one (falls also if "
+    "patterns of 2 or 3 cycles are allowed for), and sliding is smooth at the highest; for "
+    "some damping, with a qualification unless for each",
+    ("claims/sweeps/irregular",),
+)
 def irregular(trees: Sequence[xr.DataTree]) -> Finding:
-    """C22: irregular motion lies between stick-slip and smooth sliding for some parameters."""
     (tree,) = trees
     data = tree.to_dataset()
     order = ("slider.damping_ratio", "contacts.count", "drive.velocity", "realization")
@@ -96,26 +111,3 @@ def _everywhere(is_so: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 def _listed(values: Array) -> str:
     return ", ".join(f"{one:g}" for one in values)
-
-
-CLAIMS = (
-    Claim(
-        "C21",
-        "ageing turns stick-slip into smooth sliding as v_d grows",
-        "in every realization the amplitude of the spring force is more than 0.1 of F_s at the "
-        "lowest velocity and less than 0.02 at the highest, and without ageing more than 0.1 at "
-        "all; for some damping, with a qualification unless for each",
-        ("claims/sweeps/ageing",),
-        smoother,
-    ),
-    Claim(
-        "C22",
-        "irregular motion lies between stick-slip and smooth sliding for some parameters",
-        "with both numbers of contacts, in every realization: peaks of slips vary by less than a "
-        "tenth at the lowest velocity, peaks and falls by more at the middle one (falls also if "
-        "patterns of 2 or 3 cycles are allowed for), and sliding is smooth at the highest; for "
-        "some damping, with a qualification unless for each",
-        ("claims/sweeps/irregular",),
-        irregular,
-    ),
-)

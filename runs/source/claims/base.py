@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class Verdict(StrEnum):
-    """The verdict of the runs on a claim."""
+    """The verdict on a claim."""
 
     HOLDS = "holds"
     QUALIFIED = "holds with a qualification"
@@ -29,7 +29,7 @@ class Measured:
 
     name: str
     values: tuple[float, ...]
-    """One for each realization; a single one of a quantity without realizations."""
+    """One for each realization, or a single one."""
     unit: str
     source: str
     """The source's statement."""
@@ -66,7 +66,7 @@ Judge = Callable[[Sequence["xr.DataTree"]], Finding]
 
 @dataclass(frozen=True)
 class Claim:
-    """A claim of the source, the runs that decide it, and the criterion."""
+    """A claim of the source, the criterion, and the runs that decide it."""
 
     name: str
     statement: str
@@ -74,6 +74,21 @@ class Claim:
     runs: tuple[str, ...]
     """Names of outputs under the folder of outputs, without ``.nc``."""
     judge: Judge
+
+
+CLAIMS: dict[str, Claim] = {}
+
+
+def claim(
+    name: str, statement: str, criterion: str, runs: tuple[str, ...]
+) -> Callable[[Judge], Judge]:
+    """Make a function of the outputs of runs the judge of a claim."""
+
+    def add(judge: Judge) -> Judge:
+        CLAIMS[name] = Claim(name, statement, criterion, runs, judge)
+        return judge
+
+    return add
 
 
 @dataclass(frozen=True)
@@ -85,7 +100,7 @@ class Judgement:
 
 
 def verdict(holds: bool, qualified: bool = False) -> Verdict:
-    """The verdict of a claim that holds or not, perhaps with a qualification."""
+    """The verdict on a claim that holds or not, and on its qualification."""
     if not holds:
         return Verdict.FAILS
     return Verdict.QUALIFIED if qualified else Verdict.HOLDS

@@ -10,7 +10,7 @@ from mesoslip.theory.derived import derived
 from numpy.typing import NDArray
 from outputs import configuration
 
-from claims.base import Claim, Finding, measured, variable, verdict
+from claims.base import Finding, claim, measured, variable, verdict
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -21,8 +21,15 @@ Array = NDArray[np.float64]
 STICK_SLIP, SMOOTH = 0.5, 0.1
 
 
+@claim(
+    "C24",
+    "a sweep of v_d up and down shows both motions possible in a range",
+    "at some velocity, in every realization: on the way up the spring force swings by more "
+    "than half of F_s, on the way down by less than a tenth, and smooth sliding is linearly "
+    "stable there",
+    ("claims/up-and-down",),
+)
 def up_and_down(trees: Sequence[xr.DataTree]) -> Finding:
-    """C24: a sweep of the velocity up and down shows both motions possible in a range."""
     (tree,) = trees
     config = configuration(tree)
     speeds, swings = _swings(tree)
@@ -86,16 +93,3 @@ def _zero(grid: Array, growth: Array) -> float:
 
 def _listed(speeds: Array) -> str:
     return ", ".join(f"{1e6 * one:g}" for one in speeds) + " µm/s"
-
-
-CLAIMS = (
-    Claim(
-        "C24",
-        "a sweep of v_d up and down shows both motions possible in a range",
-        "at some velocity, in every realization: on the way up the spring force swings by more "
-        "than half of F_s, on the way down by less than a tenth, and smooth sliding is linearly "
-        "stable there",
-        ("claims/up-and-down",),
-        up_and_down,
-    ),
-)

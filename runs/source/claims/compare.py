@@ -1,4 +1,4 @@
-"""Judgements compared with those of an earlier page."""
+"""Comparison of judgements with those of an earlier page."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ VERDICT = re.compile(r"\*\*(.+?)\.\*\*")
 VALUE = re.compile(
     r"\(?(?P<mean>[-+.\de]+)(?: ± (?P<error>[.\de-]+))?(?:\)e(?P<power>-?\d+))?(?: (?P<unit>.+))?"
 )
-# Numbers may differ by so many errors, or by so much of themselves where there is no error: results
-# of chaotic runs depend on the last digit of a machine's arithmetic.
+# Maximum difference of numbers in errors, and relative to them where there is no error: results of
+# chaotic runs depend on the last digit of a machine's arithmetic.
 MAX_ERRORS = 2.0
 MAX_RELATIVE = 2e-3
 
@@ -39,13 +39,7 @@ class Value(NamedTuple):
 
 
 def differences(judgements: Sequence[Judgement], page: Path) -> list[str]:
-    """Judgements that differ from those of an earlier page, one line each.
-
-    Raises
-    ------
-    FileError
-        If there is no such page.
-    """
+    """Lines on judgements that differ from those of an earlier page."""
     try:
         earlier = _tables(page.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
@@ -64,7 +58,7 @@ def differences(judgements: Sequence[Judgement], page: Path) -> list[str]:
 
 
 def _tables(page: str) -> dict[str, dict[str, str]]:
-    """Quantities of each claim as texts by name, and the verdict."""
+    """Quantities of each claim by name, and the verdict, as texts."""
     tables: dict[str, dict[str, str]] = {}
     table: dict[str, str] = {}
     for line in page.splitlines():
@@ -88,7 +82,7 @@ def _agree(new: str, old: str) -> bool:
 
 
 def _value(cell: str) -> Value | None:
-    """The number of a cell; None if it is no number."""
+    """The number of a cell, if it is one."""
     match = VALUE.fullmatch(cell)
     if match is None:
         return None

@@ -9,7 +9,7 @@ import numpy as np
 from outputs import configuration
 from scipy.signal import argrelextrema
 
-from claims.base import Claim, Finding, measured, verdict
+from claims.base import Finding, claim, measured, verdict
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -18,8 +18,16 @@ if TYPE_CHECKING:
 START = 0.03
 
 
+@claim(
+    "C2",
+    "F(X) rises linearly, peaks near F_s - Delta F_s, and oscillates with decreasing amplitude "
+    "(S18)",
+    "linear within 1 % below F_s - 3 Delta F_s; peak within Delta F_s of that, with a "
+    "qualification if not within a quarter of it; each oscillation smaller than the previous "
+    "one",
+    ("S18.curve",),
+)
 def force_curve(trees: Sequence[xr.DataTree]) -> Finding:
-    """C2: F(X) rises linearly, peaks near F_s - Delta F_s, and oscillates with less amplitude."""
     (tree,) = trees
     contacts = configuration(tree).contacts
     data = tree.to_dataset()
@@ -61,8 +69,13 @@ def force_curve(trees: Sequence[xr.DataTree]) -> Finding:
     )
 
 
+@claim(
+    "C14",
+    "sequential breaking starts the drop of the force like t^3, instant melting like t^2 (S19)",
+    "exponents for tau -> 0 within 0.1",
+    ("S19a.onset", "S19b.onset"),
+)
 def onset(trees: Sequence[xr.DataTree]) -> Finding:
-    """C14: the force drops like t^3 with sequential breaking, like t^2 with instant melting."""
     found, ends = [], []
     for tree in trees:
         width = configuration(tree).contacts.threshold.relative_width
@@ -92,24 +105,3 @@ def onset(trees: Sequence[xr.DataTree]) -> Finding:
         "the cubic start is short: after tau = 2/(D1 D2) the term D2 x^2 is larger, and the force "
         "falls faster than t^3",
     )
-
-
-CLAIMS = (
-    Claim(
-        "C2",
-        "F(X) rises linearly, peaks near F_s - Delta F_s, and oscillates with decreasing amplitude "
-        "(S18)",
-        "linear within 1 % below F_s - 3 Delta F_s; peak within Delta F_s of that, with a "
-        "qualification if not within a quarter of it; each oscillation smaller than the previous "
-        "one",
-        ("S18.curve",),
-        force_curve,
-    ),
-    Claim(
-        "C14",
-        "sequential breaking starts the drop of the force like t^3, instant melting like t^2 (S19)",
-        "exponents for tau -> 0 within 0.1",
-        ("S19a.onset", "S19b.onset"),
-        onset,
-    ),
-)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from claims.base import Claim, Finding, measured, verdict
+from claims.base import Finding, claim, measured, verdict
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -21,8 +21,15 @@ MAX_RATIO, NEARLY = 1e5, 0.1
 LITTLE = 1.0
 
 
+@claim(
+    "C17",
+    "only a film that melts as a whole needs a huge viscosity; with contacts that break one "
+    "by one the slip time does not depend on it",
+    "up to 1e5 times the viscosity of the bulk the duration of the first slip changes by less "
+    "than a tenth for contacts, and by more for the film",
+    ("claims/sweeps/film",),
+)
 def film(trees: Sequence[xr.DataTree]) -> Finding:
-    """C17: only the slip time of a film that melts as a whole depends on the viscosity."""
     (tree,) = trees
     data = tree.to_dataset()
     ratio = data["contacts.drag_rate"].values / data["contacts.drag_rate"].values[0]
@@ -58,8 +65,14 @@ def film(trees: Sequence[xr.DataTree]) -> Finding:
     )  # fmt: skip
 
 
+@claim(
+    "C18",
+    "the slip time grows with the dispersion of thresholds, a little",
+    "the duration of the first slip grows with each width from 0.001 to 0.2, by less than a "
+    "factor of two in all",
+    ("claims/sweeps/slip-time",),
+)
 def dispersion(trees: Sequence[xr.DataTree]) -> Finding:
-    """C18: the slip time grows with the dispersion of thresholds, a little."""
     (tree,) = trees
     data = tree.to_dataset()
     widths = data["contacts.threshold.relative_width"].values
@@ -79,24 +92,3 @@ def dispersion(trees: Sequence[xr.DataTree]) -> Finding:
         verdict(bool(np.all(np.diff(means) > 0) and growth < LITTLE)),
         f"it grows by {100 * growth:.0f} % for two hundred times the width",
     )
-
-
-CLAIMS = (
-    Claim(
-        "C17",
-        "only a film that melts as a whole needs a huge viscosity; with contacts that break one "
-        "by one the slip time does not depend on it",
-        "up to 1e5 times the viscosity of the bulk the duration of the first slip changes by less "
-        "than a tenth for contacts, and by more for the film",
-        ("claims/sweeps/film",),
-        film,
-    ),
-    Claim(
-        "C18",
-        "the slip time grows with the dispersion of thresholds, a little",
-        "the duration of the first slip grows with each width from 0.001 to 0.2, by less than a "
-        "factor of two in all",
-        ("claims/sweeps/slip-time",),
-        dispersion,
-    ),
-)

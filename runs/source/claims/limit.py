@@ -8,15 +8,23 @@ from typing import TYPE_CHECKING
 import numpy as np
 from outputs import configuration
 
-from claims.base import Claim, Finding, measured, variable, verdict
+from claims.base import Finding, claim, measured, variable, verdict
 from claims.slips import of_each
 
 if TYPE_CHECKING:
     import xarray as xr
 
 
+@claim(
+    "C13",
+    "EQ and the master equation give the same results",
+    "difference like N^(-1/2), exponent within 0.05; the first slip's drop within 1 %",
+    (
+        *("claims/klein", "claims/klein-me", "limit-me"),
+        *(f"limit-{power}" for power in range(2, 7)),
+    ),
+)
 def engines(trees: Sequence[xr.DataTree]) -> Finding:
-    """C13: EQ and ME give the same."""
     klein, klein_infinite, infinite, *finite = trees
     exact = variable(infinite, "contact_force")[0]
     counts, errors = [], []
@@ -45,17 +53,3 @@ def engines(trees: Sequence[xr.DataTree]) -> Finding:
         "N^(-1/2). After several free slips the difference is that between realizations: the "
         "motion is chaotic",
     )
-
-
-CLAIMS = (
-    Claim(
-        "C13",
-        "EQ and the master equation give the same results",
-        "difference like N^(-1/2), exponent within 0.05; the first slip's drop within 1 %",
-        (
-            *("claims/klein", "claims/klein-me", "limit-me"),
-            *(f"limit-{power}" for power in range(2, 7)),
-        ),
-        engines,
-    ),
-)

@@ -11,7 +11,7 @@ from mesoslip.analysis.regime import regimes
 from mesoslip.output.access import group_of
 from outputs import configuration
 
-from claims.base import Claim, Finding, measured, variable, verdict
+from claims.base import Finding, claim, measured, variable, verdict
 from claims.slips import of_each
 
 if TYPE_CHECKING:
@@ -40,8 +40,15 @@ def peak_to_peak(tree: xr.DataTree) -> list[float]:
     return [float(np.ptp(one) / abs(one.mean())) for one in end]
 
 
+@claim(
+    "C6",
+    "without delay sliding becomes smooth although K << K*; with a long one the slider sticks "
+    "and slips (S22)",
+    "in the end, after 400, 200, 100 and 100 s: oscillation below a tenth of the mean without "
+    "delay, smooth at 0.1 ms, stick-slip or irregular at 0.5 and 10 ms, in every realization",
+    tuple(f"claims/delay-{one}" for one in ("0", "0.1", "0.5", "10")),
+)
 def delay(trees: Sequence[xr.DataTree]) -> Finding:
-    """C6: without delay the slider ends in smooth sliding, with a long one in stick-slip."""
     delays = [configuration(tree).contacts.delay * 1e3 for tree in trees]
     return Finding(
         tuple(
@@ -60,8 +67,15 @@ def delay(trees: Sequence[xr.DataTree]) -> Finding:
     )
 
 
+@claim(
+    "C10",
+    "interaction widens the range of stick-slip; at xi = 0.3 one avalanche spans the whole "
+    "system and F falls abruptly to about zero (S25 to S27)",
+    "smooth at xi = 0, not at 0.3; there an avalanche of more than 90 % of N, and F below 5 % "
+    "of F_s, in every realization",
+    tuple(f"claims/interaction-{one}" for one in ("0", "0.03", "0.1", "0.3")),
+)
 def interaction(trees: Sequence[xr.DataTree]) -> Finding:
-    """C10: interaction widens stick-slip; at 0.3 one avalanche spans the whole system."""
     found, largest = [], []
     for tree in trees:
         interaction = configuration(tree).interaction
@@ -89,8 +103,14 @@ def interaction(trees: Sequence[xr.DataTree]) -> Finding:
     )
 
 
+@claim(
+    "C19",
+    "the mean size of avalanches grows with the strength of the interaction (S26)",
+    "from xi = 0 over 0.03 and 0.1 to 0.3 it grows each time, with separate ranges of the "
+    "realizations; so does the mean over breaks of the size of their avalanche",
+    tuple(f"claims/interaction-{one}" for one in ("0", "0.03", "0.1", "0.3")),
+)
 def avalanche_size(trees: Sequence[xr.DataTree]) -> Finding:
-    """C19: the mean size of avalanches grows with the strength of the interaction."""
     strengths, means, weighted = [], [], []
     for tree in trees:
         interaction = configuration(tree).interaction
@@ -120,8 +140,21 @@ def avalanche_size(trees: Sequence[xr.DataTree]) -> Finding:
     )
 
 
+@claim(
+    "C12",
+    "F_d against v_d t does not depend on v_d in slow drives; at high v_d sliding is smooth",
+    "peaks and periods at 0.02 to 0.2 µm/s scatter as realizations do; smooth at 300 µm/s",
+    (
+        *(
+            "claims/velocity-0.02",
+            "claims/velocity-0.05",
+            "claims/klein",
+            "claims/velocity-0.2",
+        ),
+        *(f"claims/velocity-{one}" for one in (1, 10, 30, 100, 300)),
+    ),
+)
 def velocity(trees: Sequence[xr.DataTree]) -> Finding:
-    """C12: F_d against v_d t does not depend on v_d while it is slow; fast sliding is smooth."""
     slow, fast = trees[:4], trees[4:]
     speeds = [configuration(tree).drive_speed * 1e6 for tree in trees]
     peaks = [of_each(tree, lambda one: one["force_before"].values[1:].mean()) for tree in slow]
@@ -172,48 +205,3 @@ def velocity(trees: Sequence[xr.DataTree]) -> Finding:
             f"{speed:g} µm/s: {motion(tree)}" for speed, tree in zip(speeds[4:], fast, strict=True)
         ),
     )
-
-
-CLAIMS = (
-    Claim(
-        "C6",
-        "without delay sliding becomes smooth although K << K*; with a long one the slider sticks "
-        "and slips (S22)",
-        "in the end, after 400, 200, 100 and 100 s: oscillation below a tenth of the mean without "
-        "delay, smooth at 0.1 ms, stick-slip or irregular at 0.5 and 10 ms, in every realization",
-        tuple(f"claims/delay-{one}" for one in ("0", "0.1", "0.5", "10")),
-        delay,
-    ),
-    Claim(
-        "C10",
-        "interaction widens the range of stick-slip; at xi = 0.3 one avalanche spans the whole "
-        "system and F falls abruptly to about zero (S25 to S27)",
-        "smooth at xi = 0, not at 0.3; there an avalanche of more than 90 % of N, and F below 5 % "
-        "of F_s, in every realization",
-        tuple(f"claims/interaction-{one}" for one in ("0", "0.03", "0.1", "0.3")),
-        interaction,
-    ),
-    Claim(
-        "C12",
-        "F_d against v_d t does not depend on v_d in slow drives; at high v_d sliding is smooth",
-        "peaks and periods at 0.02 to 0.2 µm/s scatter as realizations do; smooth at 300 µm/s",
-        (
-            *(
-                "claims/velocity-0.02",
-                "claims/velocity-0.05",
-                "claims/klein",
-                "claims/velocity-0.2",
-            ),
-            *(f"claims/velocity-{one}" for one in (1, 10, 30, 100, 300)),
-        ),
-        velocity,
-    ),
-    Claim(
-        "C19",
-        "the mean size of avalanches grows with the strength of the interaction (S26)",
-        "from xi = 0 over 0.03 and 0.1 to 0.3 it grows each time, with separate ranges of the "
-        "realizations; so does the mean over breaks of the size of their avalanche",
-        tuple(f"claims/interaction-{one}" for one in ("0", "0.03", "0.1", "0.3")),
-        avalanche_size,
-    ),
-)

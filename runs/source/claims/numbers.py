@@ -12,7 +12,7 @@ from mesoslip.theory.derived import derived
 from mesoslip.theory.force_curve import ForceCurve
 from outputs import configuration
 
-from claims.base import Claim, Finding, measured, verdict
+from claims.base import Finding, claim, measured, verdict
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -22,8 +22,13 @@ if TYPE_CHECKING:
 ROUNDING = 5e-3
 
 
+@claim(
+    "C1",
+    "Omega_S = 257 1/s, tau_S = 0.0245 s, Omega_L = 1170 1/s, D1 = 2.1e-3",
+    "each within half a percent of the source's number",
+    ("claims/klein",),
+)
 def derived_numbers(trees: Sequence[xr.DataTree]) -> Finding:
-    """C1: Omega_S, tau_S, Omega_L and D1 of Klein's experiment."""
     quantities = derived(configuration(trees[0]))
     source = {
         "omega_s": (257.0, "1/s"),
@@ -50,8 +55,13 @@ def derived_numbers(trees: Sequence[xr.DataTree]) -> Finding:
     )
 
 
+@claim(
+    "C15",
+    "a cantilever's lowest bending frequency is 2.03 (K/M)^(1/2)",
+    "by the formulas and by the beam's equation within half a percent of 2.03",
+    ("claims/cantilever",),
+)
 def cantilever(trees: Sequence[xr.DataTree]) -> Finding:
-    """C15: lowest bending frequency of a cantilever over (K/M)^(1/2)."""
     from scipy.optimize import brentq
 
     ratio = derived(configuration(trees[0]))["bending_ratio"].value
@@ -68,8 +78,13 @@ def cantilever(trees: Sequence[xr.DataTree]) -> Finding:
     )
 
 
+@claim(
+    "C16",
+    "K* is about Nk (f_s - f_b)/Delta f_s (S48)",
+    "within a factor 3 at four widths from 0.003 to 0.1, exponent -1 within 0.1",
+    ("claims/klein",),
+)
 def instability(trees: Sequence[xr.DataTree]) -> Finding:
-    """C16: K* of the master equation against Nk (f_s - f_b)/Delta f_s."""
     config = configuration(trees[0])
     widths = np.array([0.003, 0.01, 0.03, 0.1])
     exact = np.array([_critical_stiffness(config, width) for width in widths])
@@ -112,28 +127,3 @@ def _critical_stiffness(config: Config, width: float) -> float:
         {"curve.length": 3 * config.contacts.break_stretch},
     )
     return ForceCurve(changed).K_star[0]
-
-
-CLAIMS = (
-    Claim(
-        "C1",
-        "Omega_S = 257 1/s, tau_S = 0.0245 s, Omega_L = 1170 1/s, D1 = 2.1e-3",
-        "each within half a percent of the source's number",
-        ("claims/klein",),
-        derived_numbers,
-    ),
-    Claim(
-        "C15",
-        "a cantilever's lowest bending frequency is 2.03 (K/M)^(1/2)",
-        "by the formulas and by the beam's equation within half a percent of 2.03",
-        ("claims/cantilever",),
-        cantilever,
-    ),
-    Claim(
-        "C16",
-        "K* is about Nk (f_s - f_b)/Delta f_s (S48)",
-        "within a factor 3 at four widths from 0.003 to 0.1, exponent -1 within 0.1",
-        ("claims/klein",),
-        instability,
-    ),
-)

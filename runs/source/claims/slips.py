@@ -14,7 +14,7 @@ from mesoslip.theory.derived import derived
 from numpy.typing import NDArray
 from outputs import configuration
 
-from claims.base import Claim, Finding, measured, variable, verdict
+from claims.base import Finding, claim, measured, variable, verdict
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -34,8 +34,13 @@ def of_each(tree: xr.DataTree, value: Callable[[xr.Dataset], float]) -> Array:
     )
 
 
+@claim(
+    "C3",
+    "the first spike is large, later ones are smaller (S20)",
+    "in each realization every later peak is below nine tenths of the first",
+    ("claims/klein",),
+)
 def first_spike(trees: Sequence[xr.DataTree]) -> Finding:
-    """C3: the first spike of the force is larger than all later ones."""
     (tree,) = trees
     first = of_each(tree, lambda one: one["force_before"].values[0])
     later = of_each(tree, lambda one: one["force_before"].values[1:].max())
@@ -51,8 +56,13 @@ def first_spike(trees: Sequence[xr.DataTree]) -> Finding:
     )
 
 
+@claim(
+    "C4",
+    "in a slip the slider moves with about Omega_S F_s/K",
+    "peak velocity of the first slip within a factor 3",
+    ("claims/klein",),
+)
 def slip_velocity(trees: Sequence[xr.DataTree]) -> Finding:
-    """C4: the velocity in a slip is of order Omega_S F_s/K."""
     (tree,) = trees
     scale = derived(configuration(tree))["slip_velocity_scale"].value
     first = of_each(tree, lambda one: one["peak_velocity"].values[0]) / scale
@@ -68,8 +78,15 @@ def slip_velocity(trees: Sequence[xr.DataTree]) -> Finding:
     )
 
 
+@claim(
+    "C5",
+    "in a slip F falls to zero, all N contacts are detached, and F oscillates with a period of "
+    "order K/(Nk Omega_S) (S21)",
+    "minimum F below 1 % of F_s, more than 99 % detached, the period without the delay within "
+    "a factor 3",
+    ("claims/slip",),
+)
 def inside_a_slip(trees: Sequence[xr.DataTree]) -> Finding:
-    """C5: F falls to zero, all contacts detach, and F oscillates with a period K/(Nk Omega_S)."""
     (tree,) = trees
     config = configuration(tree)
     contacts = config.contacts
@@ -107,9 +124,14 @@ def inside_a_slip(trees: Sequence[xr.DataTree]) -> Finding:
     )
 
 
+@claim(
+    "C7",
+    "tau_d > 1/Omega_S: negative spring force, and ringing at Omega_S; tau_d << 1/Omega_S: "
+    "the force stays above F_b and rings at Omega_L",
+    "signs in every realization, frequencies within 5 %",
+    ("claims/ringing-short", "claims/ringing-long"),
+)
 def ringing(trees: Sequence[xr.DataTree]) -> Finding:
-    """C7: a long delay makes the force negative, and it rings at Omega_S; after a short one at
-    Omega_L."""
     short, long = trees
     quantities = derived(configuration(short))
     omega_s, omega_l = quantities["omega_s"].value, quantities["omega_l"].value
@@ -174,8 +196,15 @@ def _ringing_frequency(tree: xr.DataTree) -> Array:
     return np.array(frequencies)
 
 
+@claim(
+    "C8",
+    "larger dispersion of the thresholds, shorter period (S23)",
+    "the period after the first slip decreases with the width, with separate ranges of the "
+    "realizations; with a qualification unless the settled period does so too, by more than "
+    "two standard errors of its change a decade",
+    ("claims/dispersion-0.003", "claims/dispersion-0.01", "claims/dispersion-0.03"),
+)
 def periods(trees: Sequence[xr.DataTree]) -> Finding:
-    """C8: the larger the dispersion of thresholds, the shorter the period."""
     widths = np.array([configuration(tree).contacts.threshold.relative_width for tree in trees])
     first = [of_each(tree, lambda one: one["waiting_time"].values[1]) for tree in trees]
     later = [of_each(tree, lambda one: one["waiting_time"].values[2:].mean()) for tree in trees]
@@ -210,8 +239,13 @@ def _change_a_decade(widths: Array, values: Sequence[Array]) -> tuple[float, flo
     return float(slope), float(np.sqrt(covariance[0, 0]))
 
 
+@claim(
+    "C11",
+    "a film 1e5 times as viscous leaves the duration of a slip nearly unchanged (S28)",
+    "duration and drop of the first slip within a tenth with drags 1e3, 1e4 and 1e5 times as large",
+    tuple(f"claims/drag-{one}" for one in ("2e11", "2e14", "2e15", "2e16")),
+)
 def viscosity(trees: Sequence[xr.DataTree]) -> Finding:
-    """C11: a drag larger by 1e5 leaves the duration of a slip nearly unchanged."""
     times = [of_each(tree, lambda one: one["duration"].values[0]) for tree in trees]
     drops = [of_each(tree, lambda one: one["force_drop"].values[0]) for tree in trees]
     rates = np.array([configuration(tree).contacts.drag_rate for tree in trees])
@@ -244,55 +278,3 @@ def viscosity(trees: Sequence[xr.DataTree]) -> Finding:
         "5 % longer with contacts of equal stiffness, but the force still drops by 23 % less "
         "(docs/melting-film.md)",
     )
-
-
-CLAIMS = (
-    Claim(
-        "C3",
-        "the first spike is large, later ones are smaller (S20)",
-        "in each realization every later peak is below nine tenths of the first",
-        ("claims/klein",),
-        first_spike,
-    ),
-    Claim(
-        "C4",
-        "in a slip the slider moves with about Omega_S F_s/K",
-        "peak velocity of the first slip within a factor 3",
-        ("claims/klein",),
-        slip_velocity,
-    ),
-    Claim(
-        "C5",
-        "in a slip F falls to zero, all N contacts are detached, and F oscillates with a period of "
-        "order K/(Nk Omega_S) (S21)",
-        "minimum F below 1 % of F_s, more than 99 % detached, the period without the delay within "
-        "a factor 3",
-        ("claims/slip",),
-        inside_a_slip,
-    ),
-    Claim(
-        "C7",
-        "tau_d > 1/Omega_S: negative spring force, and ringing at Omega_S; tau_d << 1/Omega_S: "
-        "the force stays above F_b and rings at Omega_L",
-        "signs in every realization, frequencies within 5 %",
-        ("claims/ringing-short", "claims/ringing-long"),
-        ringing,
-    ),
-    Claim(
-        "C8",
-        "larger dispersion of the thresholds, shorter period (S23)",
-        "the period after the first slip decreases with the width, with separate ranges of the "
-        "realizations; with a qualification unless the settled period does so too, by more than "
-        "two standard errors of its change a decade",
-        ("claims/dispersion-0.003", "claims/dispersion-0.01", "claims/dispersion-0.03"),
-        periods,
-    ),
-    Claim(
-        "C11",
-        "a film 1e5 times as viscous leaves the duration of a slip nearly unchanged (S28)",
-        "duration and drop of the first slip within a tenth with drags 1e3, 1e4 and 1e5 times as "
-        "large",
-        tuple(f"claims/drag-{one}" for one in ("2e11", "2e14", "2e15", "2e16")),
-        viscosity,
-    ),
-)

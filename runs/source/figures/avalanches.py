@@ -16,12 +16,11 @@ from mesoslip.plots.views.lattice import draw_contacts
 from mesoslip.quantities import with_error
 from outputs import configuration
 
-from figures.base import SourceFigure
+from figures.base import source_figure
 
 
+@source_figure("avalanche", "an avalanche through the whole system at four stages", ("avalanche",))
 def spreading_avalanche(trees: Sequence[xr.DataTree]) -> Figure:
-    """An avalanche through the whole system as it spreads over the lattice, a part of it at each
-    stage."""
     (tree,) = trees
     snapshot = chosen_snapshot(tree)
     generation = snapshot["generation"].values.astype(float)
@@ -39,8 +38,12 @@ def spreading_avalanche(trees: Sequence[xr.DataTree]) -> Figure:
     return figure
 
 
+@source_figure(
+    "sizes",
+    "sizes of avalanches of sliders without inertia, and of a fibre bundle",
+    ("sizes-2000", "sizes-200", "sizes-20", "bundle"),
+)
 def avalanche_sizes(trees: Sequence[xr.DataTree]) -> Figure:
-    """Sizes of avalanches without interaction: a slider without inertia, and a fibre bundle."""
     *sliders, bundle = trees
     figure = Figure(figsize=(6.5, 3.2))
     stationary, failing = figure.subplots(1, 2)
@@ -76,15 +79,3 @@ def avalanche_sizes(trees: Sequence[xr.DataTree]) -> Figure:
         axes.set_xlim(0.7, 3e5 if axes is stationary else 2e4)
         axes.legend(loc="lower left")
     return figure
-
-
-FIGURES = {
-    "avalanche": SourceFigure(
-        ("avalanche",), spreading_avalanche, "an avalanche through the whole system at four stages"
-    ),
-    "sizes": SourceFigure(
-        ("sizes-2000", "sizes-200", "sizes-20", "bundle"),
-        avalanche_sizes,
-        "sizes of avalanches of sliders without inertia, and of a fibre bundle",
-    ),
-}

@@ -1,4 +1,4 @@
-"""What a figure of the source is, and the caption below it."""
+"""Figures of the source, and the captions below them."""
 
 from __future__ import annotations
 
@@ -12,17 +12,32 @@ from matplotlib.figure import Figure
 from mesoslip.configuration.config import Config
 from outputs import configuration
 
+Draw = Callable[[Sequence[xr.DataTree]], Figure]
+
 
 @dataclass(frozen=True)
 class SourceFigure:
-    """A figure of the source: the runs it needs, the function that draws it, and what it shows."""
+    """A figure of the source: its runs, the function that draws them, and its caption."""
 
     runs: tuple[str, ...]
-    draw: Callable[[Sequence[xr.DataTree]], Figure]
+    draw: Draw
     shows: str
 
 
-# Parameters in a caption, those that all its runs share.
+FIGURES: dict[str, SourceFigure] = {}
+
+
+def source_figure(name: str, shows: str, runs: tuple[str, ...]) -> Callable[[Draw], Draw]:
+    """Make a function of the outputs of runs a figure."""
+
+    def add(draw: Draw) -> Draw:
+        FIGURES[name] = SourceFigure(runs, draw, shows)
+        return draw
+
+    return add
+
+
+# Parameters in a caption, if all its runs share them.
 PARAMETERS: tuple[Callable[[Config], str | None], ...] = (
     lambda config: f"$N$ = {config.contacts.count}" if config.contact_kind.is_discrete else None,
     lambda config: f"$F_s$ = {config.contacts.static_force * 1e6:g} µN",
@@ -48,7 +63,7 @@ CAPTION_CHARACTERS = 19
 
 
 def caption(name: str, shows: str, trees: Sequence[xr.DataTree]) -> str:
-    """What a figure shows, and the parameters that all its runs have in common."""
+    """The caption of a figure, with the parameters that all its runs share."""
     configs = [configuration(tree) for tree in trees]
     all_texts = [{parameter(config) for config in configs} for parameter in PARAMETERS]
     common = [text for texts in all_texts if len(texts) == 1 for text in texts if text is not None]
@@ -56,7 +71,7 @@ def caption(name: str, shows: str, trees: Sequence[xr.DataTree]) -> str:
 
 
 def add_caption(figure: Figure, text: str) -> None:
-    """Write a caption under a figure; formulas in it have no spaces, where it may be broken."""
+    """Write a caption under a figure, which is not broken within formulas."""
     # A formula takes less room than its source.
     width = int(CAPTION_CHARACTERS * figure.get_figwidth() * 1.15)
     kept_together = text.replace(" = ", "\u00a0=\u00a0")

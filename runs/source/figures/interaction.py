@@ -1,4 +1,4 @@
-"""Figures of contacts that push over each other."""
+"""Figures of contacts that interact."""
 
 from __future__ import annotations
 
@@ -10,18 +10,26 @@ from mesoslip.output.access import group_of
 from mesoslip.plots.style import CONTACT, SPRING
 from outputs import configuration
 
-from figures.base import SourceFigure
+from figures.base import source_figure
 from figures.panels import stacked
 from figures.traces import draw_series
 
 
+@source_figure(
+    "S25",
+    "spring force for different strengths of the interaction",
+    ("S25a", "S25b", "S25c", "S25d"),
+)
 def interactions(trees: Sequence[xr.DataTree]) -> Figure:
-    """S25: the spring force for different strengths of the interaction."""
     return stacked(trees, _strength)
 
 
+@source_figure(
+    "S26",
+    "detached contacts in the first slip for different strengths of the interaction",
+    ("S25a", "S25b", "S25c", "S25d"),
+)
 def detaching(trees: Sequence[xr.DataTree]) -> Figure:
-    """S26: detached contacts in the first slip for different strengths of the interaction."""
     figure = Figure(figsize=(6.5, 4.2))
     for letter, axes, tree in zip("abcd", figure.subplots(2, 2).flat, trees, strict=True):
         draw_series(
@@ -34,8 +42,12 @@ def detaching(trees: Sequence[xr.DataTree]) -> Figure:
     return figure
 
 
+@source_figure(
+    "S27",
+    "spring and contact force in the first slip for different strengths of the interaction",
+    ("S25a", "S25b", "S25c", "S25d"),
+)
 def interacting_slips(trees: Sequence[xr.DataTree]) -> Figure:
-    """S27: spring force and contact force in the first slip for each strength of interaction."""
     figure = Figure(figsize=(6.5, 4.2))
     all_axes = figure.subplots(2, 2).flat
     for letter, axes, tree in zip("abcd", all_axes, trees, strict=True):
@@ -59,22 +71,3 @@ def _first_slip(tree: xr.DataTree) -> tuple[float, float]:
     """Window from 2 ms before to 30 ms after the start of the first slip [s]."""
     start = group_of(tree, "slips")["start_time"].values[0]
     return start - 2e-3, start + 3e-2
-
-
-FIGURES = {
-    "S25": SourceFigure(
-        ("S25a", "S25b", "S25c", "S25d"),
-        interactions,
-        "spring force for different strengths of the interaction",
-    ),
-    "S26": SourceFigure(
-        ("S25a", "S25b", "S25c", "S25d"),
-        detaching,
-        "detached contacts in the first slip for different strengths of the interaction",
-    ),
-    "S27": SourceFigure(
-        ("S25a", "S25b", "S25c", "S25d"),
-        interacting_slips,
-        "spring and contact force in the first slip for different strengths of the interaction",
-    ),
-}

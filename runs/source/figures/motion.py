@@ -12,13 +12,13 @@ from mesoslip.plots.close_up import largest_slip, slip_window
 from mesoslip.plots.style import CONTACT, SPRING
 from outputs import configuration
 
-from figures.base import SourceFigure
+from figures.base import source_figure
 from figures.panels import shared_panels, stacked
 from figures.traces import draw_series
 
 
+@source_figure("S20", "spring force in stick-slip; inset: one slip", ("S20",))
 def stick_slip(trees: Sequence[xr.DataTree]) -> Figure:
-    """S20: the spring force in the stick-slip regime; an inset shows one slip."""
     (tree,) = trees
     figure = Figure(figsize=(6.5, 3.6))
     axes = figure.subplots()
@@ -38,8 +38,10 @@ def stick_slip(trees: Sequence[xr.DataTree]) -> Figure:
     return figure
 
 
+@source_figure(
+    "S21", "details of the first slip: (a) velocity, (b) forces, (c) detached contacts", ("S21",)
+)
 def slip_details(trees: Sequence[xr.DataTree]) -> Figure:
-    """S21: velocity (a), spring and contact force (b), detached contacts (c) during a slip."""
     (tree,) = trees
     figure = Figure(figsize=(4.5, 6))
     velocity, force, detached = figure.subplots(3, 1, sharex=True)
@@ -60,8 +62,12 @@ def slip_details(trees: Sequence[xr.DataTree]) -> Figure:
     return figure
 
 
+@source_figure(
+    "S22",
+    "spring force for different delays, at first (left) and after 388 s (right)",
+    ("S22a", "S22b", "S22c", "S22d"),
+)
 def delays(trees: Sequence[xr.DataTree]) -> Figure:
-    """S22: the spring force for different values of the delay time, at first and in the end."""
     figure = Figure(figsize=(6.5, 1.5 * len(trees) + 0.5))
     panels = shared_panels(figure, len(trees), 2)
     span = 12.0
@@ -80,8 +86,10 @@ def delays(trees: Sequence[xr.DataTree]) -> Figure:
     return figure
 
 
+@source_figure(
+    "S23", "spring force for different dispersions of the thresholds", ("S23a", "S23b", "S23c")
+)
 def dispersions(trees: Sequence[xr.DataTree]) -> Figure:
-    """S23: the spring force for different dispersions of the thresholds."""
 
     def width(tree: xr.DataTree) -> str:
         return rf"$\Delta f_s/f_s$ = {configuration(tree).contacts.threshold.relative_width:g}"
@@ -89,9 +97,10 @@ def dispersions(trees: Sequence[xr.DataTree]) -> Figure:
     return stacked(trees, width)
 
 
+@source_figure(
+    "S24", "slips of elastic sliders of 16 and 64 layers; insets: the whole cycle", ("S24a", "S24b")
+)
 def layers(trees: Sequence[xr.DataTree]) -> Figure:
-    """S24: slips of elastic sliders of 16 and 64 layers, in both measures of the force; insets show
-    the whole cycle."""
     figure = Figure(figsize=(6.5, 3.4))
     panels = figure.subplots(1, 2)
     names = ("elastic_force", "spring_force")
@@ -125,8 +134,12 @@ def layers(trees: Sequence[xr.DataTree]) -> Figure:
     return figure
 
 
+@source_figure(
+    "S28",
+    "spring force for different viscosities of the film, and its first drop",
+    ("S28a", "S28b", "S28c"),
+)
 def viscosities(trees: Sequence[xr.DataTree]) -> Figure:
-    """S28: the spring force for different viscosities of the film, and its first drop."""
     figure = Figure(figsize=(6.5, 3))
     whole, detail = figure.subplots(1, 2, width_ratios=[2, 1])
     for tree, style in zip(trees, ("-", "--", ":", "-."), strict=False):
@@ -149,33 +162,3 @@ def viscosities(trees: Sequence[xr.DataTree]) -> Figure:
     whole.legend()
     detail.set_xlabel("time in the first slip (ms)")
     return figure
-
-
-FIGURES = {
-    "S20": SourceFigure(("S20",), stick_slip, "spring force in stick-slip; inset: one slip"),
-    "S21": SourceFigure(
-        ("S21",),
-        slip_details,
-        "details of the first slip: (a) velocity, (b) forces, (c) detached contacts",
-    ),
-    "S22": SourceFigure(
-        ("S22a", "S22b", "S22c", "S22d"),
-        delays,
-        "spring force for different delays, at first (left) and after 388 s (right)",
-    ),
-    "S23": SourceFigure(
-        ("S23a", "S23b", "S23c"),
-        dispersions,
-        "spring force for different dispersions of the thresholds",
-    ),
-    "S24": SourceFigure(
-        ("S24a", "S24b"),
-        layers,
-        "slips of elastic sliders of 16 and 64 layers; insets: the whole cycle",
-    ),
-    "S28": SourceFigure(
-        ("S28a", "S28b", "S28c"),
-        viscosities,
-        "spring force for different viscosities of the film, and its first drop",
-    ),
-}

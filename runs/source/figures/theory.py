@@ -12,11 +12,15 @@ from mesoslip.output.samples import series
 from mesoslip.plots.views.onset import EQUATIONS
 from outputs import configuration
 
-from figures.base import SourceFigure
+from figures.base import source_figure
 
 
+@source_figure(
+    "S18",
+    "force $F(X)$ of the master equation against displacement, in units of $F_s$ and $f_s/k$",
+    ("S18.curve",),
+)
 def force_over_displacement(trees: Sequence[xr.DataTree]) -> Figure:
-    """S18: the force of the master equation against displacement, with f_s = 1 and Nk = 1."""
     (tree,) = trees
     data, contacts = tree.to_dataset(), configuration(tree).contacts
     figure = Figure(figsize=(4.5, 3))
@@ -38,8 +42,12 @@ def force_over_displacement(trees: Sequence[xr.DataTree]) -> Figure:
 SOURCE_COEFFICIENTS = {0.01: "0.94, 2.2e5, 1.91e?", 0.1: "0.794, 3.61e3, 4.03e2"}
 
 
+@source_figure(
+    "S19",
+    "drop of the spring force after the instability by Eqs. S46 and S47, and in slips",
+    ("S19a.onset", "S19a", "S19a-me", "S19b.onset", "S19b", "S19b-me"),
+)
 def onset_of_slip(trees: Sequence[xr.DataTree]) -> Figure:
-    """S19: drop of the spring force by S46 and S47, with the slips of both engines beside it."""
     figure = Figure(figsize=(6.5, 5.4))
     rows = figure.subplots(2, 2)
     for columns, group in zip(rows.T, (trees[:3], trees[3:]), strict=True):
@@ -89,9 +97,12 @@ def _draw_onset(axes: Axes, tree: xr.DataTree) -> None:
             )
 
 
+@source_figure(
+    "limit",
+    "force under a slider that moves forth and back, and its difference from N to infinity",
+    ("limit-me", *(f"limit-{power}" for power in range(2, 7))),
+)
 def limit_of_many_contacts(trees: Sequence[xr.DataTree]) -> Figure:
-    """Force of N contacts and of infinitely many under a slider that moves forth and back, and the
-    difference over N."""
     exact, *finite = trees
     figure = Figure(figsize=(6.5, 3))
     force, difference = figure.subplots(1, 2, width_ratios=[1.6, 1])
@@ -122,22 +133,3 @@ def limit_of_many_contacts(trees: Sequence[xr.DataTree]) -> Figure:
     difference.set_ylabel("rms difference over $F_s$")
     difference.legend()
     return figure
-
-
-FIGURES = {
-    "S18": SourceFigure(
-        ("S18.curve",),
-        force_over_displacement,
-        "force $F(X)$ of the master equation against displacement, in units of $F_s$ and $f_s/k$",
-    ),
-    "S19": SourceFigure(
-        ("S19a.onset", "S19a", "S19a-me", "S19b.onset", "S19b", "S19b-me"),
-        onset_of_slip,
-        "drop of the spring force after the instability by Eqs. S46 and S47, and in slips",
-    ),
-    "limit": SourceFigure(
-        ("limit-me", *(f"limit-{power}" for power in range(2, 7))),
-        limit_of_many_contacts,
-        "force under a slider that moves forth and back, and its difference from N to infinity",
-    ),
-}

@@ -28,20 +28,9 @@ def draw_series(
     time_unit: float = 1.0,
     **style: Any,
 ) -> None:
-    """Draw a variable against time, or against the time since the start of a window.
+    """Draw a variable against time, or against the time since the start of a window [s].
 
-    Only samples that a picture can show are read and drawn.
-
-    Parameters
-    ----------
-    axes, tree, name
-        Where, and which variable of which output.
-    window
-        Start and end [s]; everything by default.
-    time_unit
-        Unit of the time axis [s].
-    style
-        Of the line.
+    Only samples that a picture can show are read and drawn. The unit of the time axis is in s.
     """
     start = 0.0 if window is None else window[0]
     times, values = line(tree, ("time", name), EVERYTHING, window or EVERYTHING.window(tree))

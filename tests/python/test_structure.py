@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import os
 import re
 import shutil
@@ -11,10 +12,12 @@ from pathlib import Path
 
 import mesoslip
 import mutants
+import numpy as np
 import pytest
 from conftest import ROOT
 from mesoslip.configuration.sliders import SLIDERS
 from mesoslip.configuration.threshold_laws import LAWS
+from scipy.sparse import csgraph
 
 FORTRAN = ROOT / "fortran"
 # Each may use those before it; contacts and sliders do not know each other, nor does theory know
@@ -345,3 +348,48 @@ def test_mutants_are_of_these_sources():
         assert not one.mistake(), one.label
         for test in one.tests:
             assert (ROOT / test.split("::")[0]).is_file(), test
+
+
+def imports_of(path: Path, package: Path) -> set[str]:
+    """Modules of the package that a file imports, also in functions, but not for types alone."""
+    tree = ast.parse(path.read_text())
+    for node in ast.walk(tree):
+        if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING":
+            node.body = [ast.Pass()]
+    names = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            names |= {one.name for one in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            names |= {node.module, *(f"{node.module}.{one.name}" for one in node.names)}
+    found = set()
+    for name in names:
+        inner = package.joinpath(*name.split(".")[1:])
+        for file in (inner.with_suffix(".py"), inner / "__init__.py"):
+            if name.startswith("mesoslip.") and file.is_file():
+                found.add(file.relative_to(package).as_posix())
+    return found
+
+
+def circles(package: Path) -> list[list[str]]:
+    """Groups of files that import each other, in a room or across rooms."""
+    files = sorted(one.relative_to(package).as_posix() for one in package.rglob("*.py"))
+    places = {name: place for place, name in enumerate(files)}
+    links = np.zeros((len(files), len(files)))
+    for name in files:
+        for other in imports_of(package / name, package) - {name}:
+            links[places[name], places[other]] = 1
+    count, label = csgraph.connected_components(links, connection="strong")
+    groups = [[files[i] for i in np.flatnonzero(label == one)] for one in range(count)]
+    return [one for one in groups if len(one) > 1]
+
+
+def test_no_files_import_each_other(tmp_path):
+    package = ROOT / "python" / "mesoslip"
+    assert circles(package) == []
+    copy = tmp_path / "mesoslip"
+    shutil.copytree(package, copy)
+    with (copy / "plots" / "style.py").open("a") as stream:
+        stream.write("\n\ndef planted():\n    import mesoslip.plots.plot\n")
+    (found,) = circles(copy)
+    assert {"plots/style.py", "plots/plot.py"} <= set(found)

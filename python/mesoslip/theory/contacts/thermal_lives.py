@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from mesoslip.configuration.contacts.ageing import ageing_of
 from mesoslip.configuration.contacts.thermal import thermal_of
-from mesoslip.theory.contacts import ageing_lives
+from mesoslip.theory.contacts.ageing_lives import lives as breaking_ages
 from mesoslip.theory.contacts.steady import check_steady
 from mesoslip.theory.delays import drag_impulse, mean_delay
 from mesoslip.theory.thresholds import threshold_quadrature
@@ -235,7 +235,7 @@ class ThermalAgeingLives(ThermalLives):
     """The same of contacts whose thresholds change with age."""
 
     def _end(self) -> Array:
-        return ageing_lives.lives(self.config, self.threshold[:, 0], self.speed)[:, None]
+        return breaking_ages(self.config, self.threshold[:, 0], self.speed)[:, None]
 
     def young_ages(self, max_age: float, count: int) -> Array:
         # Panels of equal ratios.

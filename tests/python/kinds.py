@@ -57,20 +57,9 @@ FORCE = {
     },
 }
 
-# For master equations and solvers of differential equations, which take some tenths of a second.
-BRIEF = {
-    "drive": {
-        "stage": [
-            {"duration": 0.025, "velocity": 1e-5},
-            {"duration": 0.005, "velocity": 0.0},
-            {"duration": 0.03, "velocity": -1e-5},
-        ]
-    },
-}
-# Steps are four times as long as by default.
-ME = BRIEF | {"run__engine": "me", "run__resolution": 1.0}
-# Further from a single threshold, so that steps may be longer.
-WIDE = {"contacts__threshold__relative_width": 0.2}
+ME = {"run__engine": "me"}
+# Steps four times as long as by default, for master equations that take some tenths of a second.
+COARSE = ME | {"run__resolution": 1.0}
 RANDOM = {"contacts__delay_law": "exponential"}
 NEWBORN = {"contacts__newborn_width": 0.05}
 TABLE = {"contacts__threshold": {"law": "table", "samples": [2.0, 3.0, 3.5, 4.0, 3.0, 5.0]}}
@@ -92,7 +81,7 @@ KINDS: dict[str, dict[str, Any]] = {
     "rigid, exponential delays": RANDOM,
     "rigid, exponential delays, me": RANDOM | ME,
     "rigid, newborn width": NEWBORN,
-    "rigid, newborn width, me": NEWBORN | ME | WIDE,
+    "rigid, newborn width, me": NEWBORN | COARSE,
     "rigid, table": TABLE,
     "rigid, table, me": TABLE | ME,
     "rigid, stiffnesses": STIFFNESSES | NEWBORN,
@@ -112,17 +101,17 @@ KINDS: dict[str, dict[str, Any]] = {
     },
     "rigid, ageing, ramps": AGEING | RAMPS,
     "prescribed, ramps": RAMPS | {"slider": {"kind": "prescribed"}},
-    "prescribed, me, ramps": ME | RAMPS | {"slider": {"kind": "prescribed"}},
+    "prescribed, me, ramps": RAMPS | {"slider": {"kind": "prescribed"}, "run__engine": "me"},
     "layered, adams, ramps": RAMPS | {"slider": LAYERED | {"solver": {"method": "adams"}}},
     "quasistatic, ramps": RAMPS | {"slider": {"kind": "quasistatic", "stiffness": 97.0}},
     "prescribed": {"slider": {"kind": "prescribed"}},
     "prescribed, lattice": {"slider": {"kind": "prescribed"}} | SNAPSHOTS,
-    "prescribed, me": ME | {"slider": {"kind": "prescribed"}},
+    "prescribed, me": {"slider": {"kind": "prescribed"}, "run__engine": "me"},
     "layered": {"slider": LAYERED | {"base": BASE}, "output__layers": True},
     "layered, lattice": {"slider": LAYERED} | SNAPSHOTS,
-    "layered, me": ME | {"slider": LAYERED},
-    "layered, adams": BRIEF | {"slider": LAYERED | {"solver": {"method": "adams"}}},
-    "layered, bdf": BRIEF | {"slider": LAYERED | {"solver": {"method": "bdf"}}},
+    "layered, me": {"slider": LAYERED, "run__engine": "me"},
+    "layered, adams": {"slider": LAYERED | {"solver": {"method": "adams"}}},
+    "layered, bdf": {"slider": LAYERED | {"solver": {"method": "bdf"}}},
     "quasistatic": {"slider": {"kind": "quasistatic", "stiffness": 97.0}},
     "quasistatic, lattice": {"slider": {"kind": "quasistatic", "stiffness": 97.0}}
     | SNAPSHOTS
@@ -134,26 +123,26 @@ KINDS: dict[str, dict[str, Any]] = {
         "contacts__count": 2000,
     },
     "force": FORCE,
-    "force, me": ME | FORCE,
+    "force, me": FORCE | COARSE,
     "force, thermal": FORCE | THERMAL,
     "rigid, thermal": THERMAL,
     "rigid, thermal, ramps": THERMAL | RAMPS,
     "prescribed, thermal": THERMAL | {"slider": {"kind": "prescribed"}},
     "prescribed, thermal, ramps": THERMAL | RAMPS | {"slider": {"kind": "prescribed"}},
     "layered, thermal": THERMAL | {"slider": LAYERED | {"base": BASE}},
-    "layered, thermal, adams": BRIEF
-    | THERMAL
-    | {"slider": LAYERED | {"solver": {"method": "adams"}}},
+    "layered, thermal, adams": THERMAL | {"slider": LAYERED | {"solver": {"method": "adams"}}},
     "quasistatic, thermal": THERMAL | {"slider": {"kind": "quasistatic", "stiffness": 97.0}},
-    "rigid, thermal, me": THERMAL | ME,
+    "rigid, thermal, me": THERMAL | COARSE,
     "rigid, thermal, me, newborn width": THERMAL
     | NEWBORN
     | RANDOM
-    | ME
+    | COARSE
     | {"contacts__threshold__relative_width": 0.15},
-    "prescribed, thermal, me, table": THERMAL | TABLE | ME | {"slider": {"kind": "prescribed"}},
-    "layered, thermal, me": THERMAL | ME | {"slider": LAYERED | {"base": BASE}},
-    "force, thermal, me": ME | FORCE | THERMAL | WIDE,
+    "prescribed, thermal, me, table": THERMAL
+    | TABLE
+    | {"run__engine": "me", "slider": {"kind": "prescribed"}},
+    "layered, thermal, me": THERMAL | COARSE | {"slider": LAYERED | {"base": BASE}},
+    "force, thermal, me": FORCE | THERMAL | COARSE,
     "rigid, thermal, ageing": AGEING | THERMAL,
     "prescribed, thermal, ageing, log": AGEING
     | THERMAL
@@ -161,7 +150,7 @@ KINDS: dict[str, dict[str, Any]] = {
         "slider": {"kind": "prescribed"},
         "contacts__ageing": {"law": "log", "time": 1e-4, "growth": 0.03},
     },
-    "rigid, thermal, ageing, me": AGEING | THERMAL | ME | WIDE,
+    "rigid, thermal, ageing, me": AGEING | THERMAL | COARSE,
     "rigid, ageing": AGEING,
     "rigid, ageing, weaker": AGEING
     | {"contacts__count": 200, "contacts__ageing": RELAX | {"young_force_ratio": 1.3}},

@@ -174,7 +174,7 @@ json.dump(found, stdout)
         [],
         ["matplotlib"],
         [],
-        ["scipy.integrate"],
+        [],
         [],
         [],
         ["pandas", "xarray"],

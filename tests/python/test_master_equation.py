@@ -22,8 +22,6 @@ REVERSALS = [
     )
 ]
 PRESCRIBED = {"slider": {"kind": "prescribed"}}
-# Beyond the first slip, in coarse steps.
-QUICK = {"run__engine": "me", "run__resolution": 0.5, "run__duration": 2.2}
 LAYERS = {"mass": 1.47e-3, "stiffness": 97.0, "kind": "layered", "layers": 4}
 
 
@@ -77,7 +75,7 @@ def test_forward_sliding_is_the_force_curve(klein, coupling, initial):
 def test_steps_are_of_second_order(klein, coupling, width, back_force_ratio):
     """The greatest error, however strong the back force is."""
     errors = []
-    for resolution in (0.5, 0.125):
+    for resolution in (0.25, 0.0625):
         config = klein(
             run__engine="me",
             run__resolution=resolution,
@@ -95,7 +93,7 @@ def test_steps_are_of_second_order(klein, coupling, width, back_force_ratio):
         inside = trace[:, 2] < curve.samples[-1]
         error = trace[inside, 5] - curve.force(trace[inside, 2])
         errors.append(np.max(np.abs(error)) / FORCE)
-    assert errors[1] < 1e-3
+    assert errors[1] < 2.5e-4
     assert errors[1] < errors[0] / 10
 
 
@@ -114,7 +112,7 @@ def test_steps_are_of_second_order_through_reversals(klein, delay, back_force_ra
                 contacts__coupling="equal",
             )
         ).trace[:, 5]
-        for resolution in (0.0625, 0.5, 0.125)
+        for resolution in (0.03125, 0.5, 0.125)
     ]
     coarse, fine = (np.max(np.abs(trace - traces[0])) / FORCE for trace in traces[1:])
     assert fine < 1.5e-3
@@ -192,7 +190,7 @@ def test_the_delay_weakens_the_force(klein, law, velocity):
     config = klein(
         run__engine="me",
         run__duration=3e-6 / velocity,
-        run__resolution=0.2,
+        run__resolution=0.1,
         drive__velocity=velocity,
         contacts__initial="steady",
         output__interval=3e-9 / velocity,
@@ -201,17 +199,17 @@ def test_the_delay_weakens_the_force(klein, law, velocity):
     )
     trace = finish(config).trace
     late = trace[len(trace) // 2 :]
-    assert np.mean(late[:, 5]) == pytest.approx(stationary_force(config, velocity), rel=8e-4)
+    assert np.mean(late[:, 5]) == pytest.approx(stationary_force(config, velocity), rel=2e-4)
 
 
 @pytest.mark.parametrize("coupling", ["scaled", "equal"])
 def test_many_contacts_tend_to_it(klein, coupling):
     """Reversals, delay and drag: what N contacts differ by falls as N^(-1/2)."""
     exact = finish(
-        back_and_forth(klein, run__engine="me", run__resolution=0.125, contacts__coupling=coupling)
+        back_and_forth(klein, run__engine="me", run__resolution=0.0625, contacts__coupling=coupling)
     ).trace[:, 5]
     scaled = []
-    for count in (100, 1000, 10_000, 100_000):
+    for count in (100, 1000, 10_000, 100_000, 1_000_000):
         config = back_and_forth(klein, contacts__count=count, contacts__coupling=coupling)
         error = finish(config).trace[:, 5] - exact
         scaled.append(np.sqrt(np.mean(error**2) * count) / FORCE)
@@ -242,7 +240,7 @@ def test_contacts_that_survived_do_not_break_below_it(klein):
         **dispersion(width),
     }
     remembering = finish(klein(run__engine="me", run__resolution=0.1, **changes)).trace
-    contacts = finish(klein(contacts__count=100_000, **changes)).trace
+    contacts = finish(klein(contacts__count=1_000_000, **changes)).trace
     law = frozen_law("gaussian", width)
     top = 0.088e-7 / 9e-9
     memory = top * law.sf(top) / law.sf(0.1)
@@ -252,7 +250,7 @@ def test_contacts_that_survived_do_not_break_below_it(klein):
     assert remembering[first, 5] / FORCE == pytest.approx(memory, abs=2e-4)
     # Back at the same place: the same force with memory, much less without.
     assert remembering[-1, 5] / FORCE == pytest.approx(memory, abs=2e-4)
-    assert contacts[-1, 5] / FORCE == pytest.approx(memory, abs=1e-2)
+    assert contacts[-1, 5] / FORCE == pytest.approx(memory, abs=3e-3)
     assert memoryless < memory - 0.1
 
 
@@ -272,8 +270,9 @@ def test_the_first_slip_of_klein(klein):
 @pytest.mark.parametrize("engine_slider", [{}, PRESCRIBED])
 def test_contacts_are_conserved(klein, engine_slider):
     """Pinned and detached ones together are N, to rounding, after slips and reversals."""
-    realization = Realization(klein(**QUICK, **engine_slider), 0)
-    while realization.time < 2.1 and not realization.finished:
+    changes = {"run__duration": 4.0, **engine_slider}
+    realization = Realization(klein(run__engine="me", **changes), 0)
+    while realization.time < 3.9 and not realization.finished:
         realization.advance(20_000)
         if realization.ending:
             break
@@ -299,8 +298,8 @@ def test_contacts_are_conserved(klein, engine_slider):
 )
 def test_energy_balance_closes_with_the_step(klein, changes):
     """To rounding, with the work by which steps differ from the contacts, which is little."""
-    realization = finish(klein(**QUICK, **changes))
-    assert abs(realization.energy_residual) < 1e-9
+    realization = finish(klein(run__engine="me", run__duration=3.0, **changes))
+    assert abs(realization.energy_residual) < 1e-10
     assert 0 < abs(realization.step_work) < 1e-6
 
 
@@ -402,7 +401,7 @@ def test_estimated_errors_are_those_of_a_run(klein, changes):
 
 def test_segments_do_not_matter(klein):
     """The same numbers to the bit, also when the arrays grow on the way."""
-    config = klein(**QUICK, output__slip_interval=1e-4)
+    config = klein(run__engine="me", run__duration=2.2, output__slip_interval=1e-4)
     whole = finish(config)
     pieces = finish(config, 777)
     assert np.array_equal(whole.trace, pieces.trace)
@@ -411,8 +410,8 @@ def test_segments_do_not_matter(klein):
 
 
 def test_backward_mirrors_forward(klein):
-    forward = finish(klein(**QUICK)).trace
-    backward = finish(klein(**QUICK, drive__velocity=-1e-7)).trace
+    forward = finish(klein(run__engine="me", run__duration=2.2)).trace
+    backward = finish(klein(run__engine="me", run__duration=2.2, drive__velocity=-1e-7)).trace
     np.testing.assert_allclose(backward[:, 1:6], -forward[:, 1:6], rtol=0, atol=1e-18)
     np.testing.assert_array_equal(backward[:, 6], forward[:, 6])
 
@@ -424,8 +423,9 @@ def test_without_attaching_the_force_ends(klein):
 
 
 def test_samples_do_not_change_a_run(klein):
-    coarse = finish(klein(output__interval=1e-2, **QUICK))
-    fine = finish(klein(output__interval=1e-3, **QUICK))
+    config = {"run__engine": "me", "run__duration": 2.2}
+    coarse = finish(klein(output__interval=1e-2, **config))
+    fine = finish(klein(output__interval=1e-3, **config))
     np.testing.assert_array_equal(coarse.trace[:, 1:], fine.trace[::10, 1:])
     assert np.array_equal(coarse.energy, fine.energy)
 

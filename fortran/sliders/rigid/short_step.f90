@@ -315,6 +315,7 @@ contains
       step%acceleration = late%acceleration
    end subroutine move
 
+   !> Parts of a step that enter the energy balance.
    pure function books_of(step, drag) result(books)
       type(short_step_type), intent(in) :: step
       !> Drag of the contacts [N s/m]

@@ -1,7 +1,7 @@
 """Break the program on purpose, and see whether tests notice: ``make mutants``.
 
 Each mutant of mutants.toml replaces a text, which stands once in a source, by a wrong one, and
-names the tests that should fail then. The sources themselves are not touched: mutants are made of
+names the tests that should fail then: of pytest, or a program of tests/fortran. The sources themselves are not touched: mutants are made of
 copies in build/mutants.
 """
 
@@ -91,7 +91,7 @@ def prepare_kernel() -> None:
             target.parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(source, target)
     if not (KERNEL / "build.ninja").exists():
-        options = ["--buildtype=plain", "-Doptimization=1", "-Db_lto=false"]
+        options = ["--buildtype=plain", "-Doptimization=1", "-Db_lto=false", "-Dtests=true"]
         setup = run("meson", "setup", *options, KERNEL, SOURCE)
         if setup.returncode:
             raise SystemExit(setup.stdout + setup.stderr)
@@ -131,16 +131,23 @@ PYTEST = (sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider")
 
 def check_tests(mutants: list[Mutant]) -> None:
     """Have the tests pass with the package as it is, or a failure would not tell a mutant."""
-    tests = sorted({test for one in mutants for test in one.tests})
+    tests = sorted({test for one in mutants for test in one.tests if not is_program(test)})
     done = run(*PYTEST, "-n", 2, *tests)
     if done.returncode:
         raise SystemExit(f"mutants: the tests fail without any mutant\n{done.stdout[-3000:]}")
 
 
+def is_program(test: str) -> bool:
+    """Whether a test is a Fortran program."""
+    return test.endswith(".f90")
+
+
 def passes(tests: tuple[str, ...]) -> bool:
     """Whether the tests pass with the copied package."""
+    programs = [Path(test).stem.removeprefix("test_") for test in tests if is_program(test)]
+    line = ("meson", "test", "-C", KERNEL, *programs) if programs else (*PYTEST, *tests)
     try:
-        done = run(*PYTEST, *tests, seconds=TEST_SECONDS)
+        done = run(*line, seconds=TEST_SECONDS)
     except subprocess.TimeoutExpired:
         return False
     if done.returncode not in {0, 1, 2}:

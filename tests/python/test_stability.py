@@ -111,6 +111,21 @@ def test_the_critical_spring_of_rate_and_state_is_that_of_rice_and_ruina():
                 assert same[0] == pytest.approx(found[0], rel=1e-4)
 
 
+def test_a_critical_spring_between_the_frequencies_of_the_path_is_found():
+    """A dip below zero, narrower than the parabola through three frequencies, which stays above."""
+    middle = 20.0
+
+    def response(frequency):
+        return 1j * (1 - 1.2 * np.exp(-((frequency - middle) ** 2)))
+
+    path = middle + 0.45 + 1.5 * np.arange(-3, 4)
+    assert np.all(response(path).imag > 0)
+    found = critical_spring(RigidSlider(mass=1e-3, stiffness=97.0, damping=0.0), response, path)
+    assert found is not None
+    frequency = middle + math.sqrt(math.log(1.2))
+    assert found == pytest.approx((1e-3 * frequency**2, frequency), rel=1e-6)
+
+
 @pytest.mark.parametrize(("layers", "damping"), [(2, 300.0), (8, 500.0)])
 def test_the_critical_spring_of_layers_is_where_stability_ends(klein, layers, damping):
     """By counting roots; with much stiffer springs as well."""

@@ -1,8 +1,8 @@
 """Break the program on purpose, and see whether tests notice: ``make mutants``.
 
 Each mutant of mutants.toml replaces a text, which stands once in a source, by a wrong one, and
-names the tests that should fail then: of pytest, or a program of tests/fortran. The sources themselves are not touched: mutants are made of
-copies in build/mutants.
+names the tests that should fail then: of pytest, or a program of tests/fortran. The sources
+themselves are not touched: mutants are made of copies in build/mutants.
 """
 
 from __future__ import annotations

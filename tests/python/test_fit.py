@@ -107,7 +107,7 @@ def linear_problem(seed, total=400):
 @pytest.fixture(scope="module", params=[(0, 1, 4, 5), long(range(14))])
 def linear_problems(request):
     """Some of them, for what is tested of them together; of the few, three are far from bounds."""
-    return [linear_problem(seed, 300) for seed in request.param]
+    return [linear_problem(seed) for seed in request.param]
 
 
 def test_a_normal_problem_has_its_exact_posterior(linear_problems):

@@ -174,6 +174,47 @@ def test_foreign_files_are_never_touched(tmp_path):
     assert (theirs / "lock").read_text() == "theirs"
 
 
+def test_links_in_a_store_are_not_followed(tmp_path):
+    """As in one out of an archive."""
+    precious, points = tmp_path / "precious", tmp_path / "points"
+    precious.write_text("precious")
+    with Store(points, "points", "one") as store:
+        for name in (".00000a.json.part", ".00000a.nc.part", "00000b.json"):
+            (points / name).symlink_to(precious)
+        store.write("00000a", {}, b"output")
+        with pytest.raises(FileError, match=r"00000b\.json: cannot be read: is a link"):
+            store.read("00000b")
+    (points / "manifest.json").unlink()
+    (points / "manifest.json").symlink_to(precious)
+    with pytest.raises(FileError, match="of another configuration"):
+        Store(points, "points", "one")
+    assert precious.read_text() == "precious"
+
+
+def test_pipes_in_a_folder_are_refused(tmp_path):
+    os.mkfifo(tmp_path / "00000a.json")
+    with pytest.raises(FileError, match=r"00000a\.json: cannot be read: is not a regular file"):
+        Pieces(tmp_path).read("00000a")
+
+
+@pytest.mark.parametrize("names", [[], ["thesis.tex"]])
+def test_a_link_to_a_folder_needs_the_mark_of_a_store(names, tmp_path):
+    theirs, link = tmp_path / "theirs", tmp_path / "out.points"
+    theirs.mkdir()
+    for name in names:
+        (theirs / name).write_text("theirs")
+    link.symlink_to(theirs)
+    with pytest.raises(FileError, match="was not made by this program"):
+        Store(link, "points")
+    assert [one.name for one in theirs.iterdir()] == names
+    link.unlink()
+    with Store(tmp_path / "kept", "points") as store:
+        store.write("00000a", {})
+    link.symlink_to(tmp_path / "kept")
+    with Store(link, "points") as store:
+        assert store.names() == {"00000a"}
+
+
 @pytest.mark.parametrize("name", ["manifest.json", "00000a.nc", ".00000a.json.part", "lock"])
 def test_a_store_takes_no_file_of_its_names_for_its_own(name, tmp_path):
     """In a folder that holds files of others, such as .gitignore; an empty lock is one of them."""

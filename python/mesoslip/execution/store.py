@@ -12,7 +12,6 @@ import fcntl
 import json
 import os
 import re
-import stat
 import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -20,6 +19,7 @@ from pathlib import Path
 from typing import IO, Any, Self
 
 from mesoslip.errors import FileError, WriteError
+from mesoslip.execution.regular_files import open_regular, regular_descriptor
 
 LOCK = "lock"
 
@@ -58,12 +58,16 @@ class Folder:
                 return False
             raise
         mark = self._mark()
-        # A process that was killed while it made the lock leaves an empty one.
-        return names <= {LOCK} if mark == b"" else mark == self._own_mark
+        if mark == b"":
+            # A process that was killed while it made the lock leaves an empty one.
+            return names <= {LOCK} and not self.path.is_symlink()
+        return mark == self._own_mark
 
     @property
     def _is_free(self) -> bool:
-        """Whether it is a folder without a lock or files of these names."""
+        """Whether it is a folder, not a link to one, without a lock or files of these names."""
+        if self.path.is_symlink():
+            return False
         try:
             names = [one.name for one in self.path.iterdir()]
         except OSError:
@@ -78,17 +82,16 @@ class Folder:
     def _mark(self) -> bytes | None:
         """Content of the lock, empty if there is no lock; None if it is not a regular file."""
         try:
-            number = self._open_lock(os.O_RDONLY)
+            with self.open(LOCK, "rb") as file:
+                return file.read(100)
         except FileNotFoundError:
             return b""
         except OSError:
             return None
-        with os.fdopen(number, "rb") as file:
-            return file.read(100) if _is_regular(number) else None
 
-    def _open_lock(self, flags: int) -> int:
-        # Without following a link or waiting for the other end of a pipe.
-        return os.open(self.path / LOCK, flags | os.O_NOFOLLOW | os.O_NONBLOCK, 0o666)
+    def open(self, name: str, mode: str) -> IO[bytes]:
+        """Open one of its files; see `open_regular`."""
+        return open_regular(self.path / name, mode)
 
     def check(self) -> None:
         """Refuse a folder, or another file at its path, that this program has not made."""
@@ -109,7 +112,7 @@ class Folder:
         while True:
             self.check()
             self.path.mkdir(parents=True, exist_ok=True)
-            number = self._open_lock(os.O_RDWR | os.O_CREAT)
+            number = regular_descriptor(self.path / LOCK, os.O_RDWR | os.O_CREAT)
             try:
                 fcntl.flock(number, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
@@ -187,7 +190,7 @@ class Folder:
         part, target = self.path / f".{name}.part", self.path / name
         self.path.mkdir(parents=True, exist_ok=True)
         try:
-            with part.open("wb") as file:
+            with open_regular(part, "xb") as file:
                 yield file
                 file.flush()
                 os.fsync(file.fileno())
@@ -203,10 +206,6 @@ class Folder:
             os.fsync(folder)
         finally:
             os.close(folder)
-
-
-def _is_regular(number: int) -> bool:
-    return stat.S_ISREG(os.fstat(number).st_mode)
 
 
 class Pieces:
@@ -228,7 +227,8 @@ class Pieces:
         """A piece; None if it is missing or damaged."""
         path = self.path / f"{name}.json"
         try:
-            content = path.read_bytes()
+            with open_regular(path, "rb") as file:
+                content = file.read()
         except FileNotFoundError:
             return None
         except OSError as error:
@@ -271,7 +271,8 @@ class Store(Pieces):
 
     def _check(self, fingerprint: str) -> None:
         try:
-            there = json.loads((self.path / MANIFEST).read_bytes()).get("fingerprint")
+            with self._folder.open(MANIFEST, "rb") as file:
+                there = json.load(file).get("fingerprint")
         except FileNotFoundError:
             there = None if self.names() else fingerprint
             if there:

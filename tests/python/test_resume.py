@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import gc
 import os
 import signal
@@ -20,10 +21,12 @@ from conftest import klein_tables, long
 from invariants import differences
 from kinds import KINDS, RANDOM, THERMAL, configuration
 from mesoslip import Config, FileError, RunError
+from mesoslip.execution.store import Folder
 from mesoslip.output.tree import build_tree
 from mesoslip.simulation.checkpoint import Checkpoint, checkpoint_folder
 from mesoslip.simulation.kernel import Kernel
 from mesoslip.simulation.realization import Realization
+from mesoslip.simulation.recorded_tables import TABLES
 from mesoslip.simulation.run_realizations import Results, run_realizations
 
 ONCE = {}
@@ -116,19 +119,23 @@ def test_what_was_recorded_waits_in_files(tmp_path, monkeypatch):
     assert_same(whole("rigid, lattice"), build_tree(Results(config, [one], True, 0.0)))
 
 
-def test_a_full_disk_does_not_stop_a_run(tmp_path):
+def test_a_full_disk_does_not_stop_a_run(tmp_path, monkeypatch):
     """It says so, once, goes on, and what cannot be put into files stays in memory."""
     config, printed = configuration("rigid"), []
+
+    def full(*_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
     with Checkpoint(tmp_path, config, interval=1e-9, report=printed.append) as checkpoint:
         checkpoint.restore([])
-        (tmp_path / "trace.rows").symlink_to("/dev/full")
+        monkeypatch.setattr(Folder, "open", full)
         results = run_realizations(config, checkpoint=checkpoint)
         assert not checkpoint.write(results.realizations)
         assert len(printed) == 1
         assert "No space left" in printed[0]
         assert_same(whole("rigid"), build_tree(results))
         # Once there is room again, there is a checkpoint.
-        (tmp_path / "trace.rows").unlink()
+        monkeypatch.undo()
         assert checkpoint.write(results.realizations)
     assert (tmp_path / "state.npz").exists()
 
@@ -212,14 +219,83 @@ def test_what_cannot_be_read_is_not_taken_for_damaged(tmp_path):
     assert (tmp_path / "state.npz").exists()
 
 
-def test_rows_that_were_changed_are_reported(tmp_path):
+def test_links_in_a_checkpoint_are_not_followed(tmp_path):
+    """As in one out of an archive: new files take their places, and others are refused."""
+    precious, folder = tmp_path / "precious", tmp_path / "c"
+    precious.write_text("precious")
+    config = configuration("rigid")
+    folder.mkdir()
+    (folder / "lock").write_text("mesoslip checkpoint\n")
+    names = [f"{table}.rows" for table in TABLES]
+    for name in (".state.npz.part", *names):
+        (folder / name).symlink_to(precious)
+    one = Realization(config, 0)
+    with Checkpoint(folder, config) as checkpoint:
+        one.advance(200)
+        assert checkpoint.write([one])
+    for name in ("trace.rows", "state.npz"):
+        (folder / name).unlink()
+        (folder / name).symlink_to(precious)
+        with (
+            Checkpoint(folder, config, resume=True) as checkpoint,
+            pytest.raises(FileError, match=f"{name}: cannot be read: is a link"),
+        ):
+            checkpoint.restore([Realization(config, 0)])
+    with Checkpoint(folder, config) as checkpoint:
+        checkpoint.remove()
+    assert not folder.exists()
+    assert precious.read_text() == "precious"
+
+
+@pytest.mark.parametrize("states", [1, 2])
+def test_rows_that_were_changed_are_reported(states, tmp_path):
+    """The state before is used if its rows are whole; otherwise the run starts from the beginning,
+    and keeps the checkpoint."""
     config, printed = configuration("rigid"), []
-    advanced(config, tmp_path, 2000, printed)
-    path = tmp_path / "trace.rows"
+    folder = tmp_path / "c"
+    for _ in range(states):
+        advanced(config, folder, 1000, printed)
+    path = folder / "trace.rows"
     data = path.read_bytes()
-    path.write_bytes(data[:100] + bytes([data[100] ^ 1]) + data[101:])
-    with pytest.raises(RunError, match=r"trace\.rows: damaged"):
-        build_tree(advanced(config, tmp_path, None, printed))
+    path.write_bytes(data[:-100] + bytes([data[-100] ^ 1]) + data[-99:])
+    printed.clear()
+    assert_same(whole("rigid"), build_tree(advanced(config, folder, None, printed)))
+    assert "state.npz: damaged (trace.rows differs from the rows that the run wrote)" in printed[0]
+    if states == 2:
+        assert len(printed) == 1
+        assert printed[0].endswith("the state before it is used, state.previous.npz")
+    else:
+        assert "starts from the beginning" in printed[1]
+        assert (tmp_path / "c.old" / "damaged.state.npz").exists()
+
+
+def test_no_realization_is_restored_from_a_damaged_state(tmp_path):
+    """One that has started since the state before starts again."""
+    config = configuration("rigid, three realizations")
+    folder = tmp_path / "c"
+    first = [Realization(config, number) for number in range(3)]
+    with Checkpoint(folder, config) as checkpoint:
+        for number in (0, 1):
+            first[number].advance(200)
+            assert checkpoint.write(first)
+    path = folder / "trace.rows"
+    data = path.read_bytes()
+    path.write_bytes(data[:-1] + bytes([data[-1] ^ 1]))
+    again = [Realization(config, number) for number in range(3)]
+    with Checkpoint(folder, config, resume=True) as checkpoint:
+        checkpoint.restore(again)
+    assert [one.advances for one in again] == [first[0].advances, 0, 0]
+
+
+def test_rows_that_are_damaged_while_the_run_continues_are_reported(tmp_path):
+    config = configuration("rigid")
+    one = Realization(config, 0)
+    with Checkpoint(tmp_path, config) as checkpoint:
+        one.advance(100)
+        assert checkpoint.write([one])
+        (tmp_path / "trace.rows").write_bytes(b"")
+        with pytest.raises(RunError, match=r"trace\.rows: damaged"):
+            _ = one.trace
 
 
 def test_another_configuration_or_program_is_refused(tmp_path, monkeypatch):

@@ -17,7 +17,7 @@ import threading
 import time
 import tomllib
 import zlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from importlib.metadata import version
 from itertools import count
@@ -48,6 +48,7 @@ MAX_WAITING_BYTES = 64e6
 
 STATE, PREVIOUS = "state.npz", "state.previous.npz"
 DAMAGED = "damaged."
+ROWS = "{}.rows"
 NAMES = rf"(damaged\.)?state(\.previous)?\.npz|({'|'.join(TABLES)})\.rows"
 
 
@@ -95,7 +96,6 @@ class Checkpoint:
         self._report = report
         # The running version: another one may be installed before a checkpoint is written.
         self._program = _program()
-        self._paths = {table: folder / f"{table}.rows" for table in TABLES}
         self._sizes = dict.fromkeys(TABLES, 0)
         # By number of the realization: the latest state with its epoch, and those with new rows.
         self._saved: dict[int, tuple[int, Saved]] = {}
@@ -170,7 +170,10 @@ class Checkpoint:
             try:
                 return self._read(self.folder / name, realizations)
             except DamagedError as error:
-                self._report(f"{self.folder / name}: damaged ({error})")
+                message = f"{self.folder / name}: damaged ({error})"
+                if name != there[-1]:
+                    message += f"; the state before it is used, {there[-1]}"
+                self._report(message)
                 # It must not replace the previous state, which may be whole.
                 (self.folder / name).replace(self.folder / f"{DAMAGED}{name}")
         if there:
@@ -233,13 +236,15 @@ class Checkpoint:
                     rows.store(number, self._append(table, values))
 
     def _append(self, table: str, values: Any) -> Stored:
-        path, place = self._paths[table], self._sizes[table]
+        name, place = ROWS.format(table), self._sizes[table]
         data = np.ascontiguousarray(values, dtype=np.float64)
-        with path.open("r+b" if place else "wb") as file:
+        with self._files.open(name, "r+b" if place else "xb") as file:
             file.seek(place)
             file.write(data.data)
         self._sizes[table] = place + data.nbytes
-        return Stored(path, place, (data.shape[0], data.shape[1]), zlib.crc32(data.data))
+        return Stored(
+            self.folder / name, place, (data.shape[0], data.shape[1]), zlib.crc32(data.data)
+        )
 
     def _write(self, realizations: Sequence[Realization]) -> bool:
         self._last = time.perf_counter()
@@ -259,7 +264,7 @@ class Checkpoint:
         self._flush([realizations[number] for number in saved])
         for table, size in self._sizes.items():
             if size:
-                with self._paths[table].open("r+b") as file:
+                with self._files.open(ROWS.format(table), "r+b") as file:
                     file.truncate(size)
                     os.fsync(file.fileno())
         arrays: dict[str, Any] = {}
@@ -290,10 +295,7 @@ class Checkpoint:
 
     def _read(self, path: Path, realizations: Sequence[Realization]) -> float:
         """Restore realizations from a state, unless it is damaged or `_compare` refuses it."""
-        try:
-            data = path.read_bytes()
-        except OSError as error:
-            raise FileError(f"{path}: cannot be read: {error.strerror or error}") from error
+        data = self._content(path.name)
         try:
             with np.load(io.BytesIO(data), allow_pickle=False) as file:
                 header = json.loads(str(file["header"]))
@@ -305,29 +307,50 @@ class Checkpoint:
         if missing := {f"pieces.{table}" for table in TABLES} - arrays.keys():
             raise DamagedError(f"without {min(missing)}")
         sizes = dict.fromkeys(TABLES, 0)
-        tables: dict[int, dict[str, Rows]] = {}
-        for text, kept in header["realizations"].items():
-            columns = kept["scalars"]["columns"]
-            tables[int(text)] = {table: Rows(columns[table]) for table in columns}
+        kept = {int(text): one for text, one in header["realizations"].items()}
+        tables = {
+            number: {table: Rows(columns) for table, columns in one["scalars"]["columns"].items()}
+            for number, one in kept.items()
+        }
         for table in TABLES:
-            file_path = self._paths[table]
-            for number, place, length, columns, checksum in arrays[f"pieces.{table}"].tolist():
-                stored = Stored(file_path, place, (length, columns), checksum)
+            pieces = arrays[f"pieces.{table}"].tolist()
+            for number, stored in self._stored(ROWS.format(table), pieces):
                 tables[number][table].add(stored)
-                sizes[table] = max(sizes[table], place + 8 * length * columns)
-            if sizes[table] and (not file_path.exists() or file_path.stat().st_size < sizes[table]):
-                raise DamagedError(f"{file_path.name} is too short")
-        for text, kept in header["realizations"].items():
-            number = int(text)
-            counts = {table: len(rows) for table, rows in tables[number].items()}
-            if counts != kept["counts"]:
+                sizes[table] = max(sizes[table], stored.end)
+        for number, one in kept.items():
+            if {table: len(rows) for table, rows in tables[number].items()} != one["counts"]:
                 raise DamagedError("rows are missing")
-            saved = Saved(kept["scalars"], kept["counts"], arrays.get(f"words.{number}"))
+        # No realization is restored unless all can be.
+        for number, one in kept.items():
+            saved = Saved(one["scalars"], one["counts"], arrays.get(f"words.{number}"))
             realizations[number].restore(saved, tables[number])
             self._saved[number] = (0, saved)
         self._sizes = sizes
         self._earlier_seconds = float(header["wall_seconds"])
         return self._earlier_seconds
+
+    def _content(self, name: str) -> bytes:
+        try:
+            with self._files.open(name, "rb") as file:
+                return file.read()
+        except OSError as error:
+            raise _not_read(self.folder / name, error) from error
+
+    def _stored(self, name: str, pieces: list[list[int]]) -> Iterator[tuple[int, Stored]]:
+        """Numbers of realizations and their rows in a file, which must be as they were written."""
+        if not pieces:
+            return
+        try:
+            with self._files.open(name, "rb") as file:
+                for number, place, length, columns, checksum in pieces:
+                    stored = Stored(self.folder / name, place, (length, columns), checksum)
+                    if not stored.is_whole(file):
+                        raise DamagedError(f"{name} differs from the rows that the run wrote")
+                    yield number, stored
+        except FileNotFoundError:
+            raise DamagedError(f"{name} is missing") from None
+        except OSError as error:
+            raise _not_read(self.folder / name, error) from error
 
     def _compare(self, header: dict[str, Any]) -> None:
         """Refuse a state of another configuration or program."""
@@ -347,6 +370,10 @@ class Checkpoint:
                 + _difference(header["configuration"], self._config.to_toml())
                 + advice
             )
+
+
+def _not_read(path: Path, error: OSError) -> FileError:
+    return FileError(f"{path}: cannot be read: {error.strerror or error}")
 
 
 def _difference(old: str, new: str) -> str:

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import zlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import IO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip.errors import RunError
+from mesoslip.execution.regular_files import open_regular
 from mesoslip.simulation.kernel import name_list
 
 Array = NDArray[np.float64]
@@ -63,16 +66,32 @@ class Stored:
     def __len__(self) -> int:
         return self.shape[0]
 
+    @property
+    def end(self) -> int:
+        """The place after them [bytes]."""
+        return self.place + math.prod(self.shape) * np.dtype(np.float64).itemsize
+
     def load(self) -> Array:
         """Read them; raises a `RunError` if they differ from the written rows."""
-        count = self.shape[0] * self.shape[1]
         try:
-            values = np.fromfile(self.path, dtype=np.float64, count=count, offset=self.place)
+            with open_regular(self.path, "rb") as file:
+                values = self._read(file)
         except OSError as error:
             raise RunError(f"{self.path}: cannot be read: {error.strerror}") from error
-        if values.size != count or zlib.crc32(values.data) != self.checksum:
+        if not self._equals(values):
             raise RunError(f"{self.path}: damaged: it differs from the rows that the run wrote")
         return values.reshape(self.shape)
+
+    def is_whole(self, file: IO[bytes]) -> bool:
+        """Whether their file, which is open, has the written rows."""
+        return self._equals(self._read(file))
+
+    def _read(self, file: IO[bytes]) -> Array:
+        file.seek(self.place)
+        return np.fromfile(file, dtype=np.float64, count=math.prod(self.shape))
+
+    def _equals(self, values: Array) -> bool:
+        return values.size == math.prod(self.shape) and zlib.crc32(values.data) == self.checksum
 
 
 class Rows:

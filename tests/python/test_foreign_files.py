@@ -105,6 +105,81 @@ def test_a_configuration_of_an_output_reads_no_file(output, tmp_path, command):
     assert again.drive.history is not None
 
 
+def _first_becomes_last(values):
+    values[0] = values[-1]
+
+
+def _one_twice(values):
+    values[1] = values[0]
+
+
+def _of_none(values):
+    values[-1] = 1
+
+
+def _before_the_first(values):
+    values[0] = -1
+
+
+def _unknown(values):
+    values[-1] = np.nan
+
+
+WRONG_ROWS = (
+    ("slips/realization_index", _of_none),
+    ("slips/realization_index", _before_the_first),
+    ("stages/realization_index", _of_none),
+    ("slip_traces/realization_index", _of_none),
+    ("slip_traces/sample_time", _first_becomes_last),
+    ("slips/start_time", _unknown),
+    ("slips/end_time", lambda values: values.fill(0.0)),
+    ("time", _first_becomes_last),
+    ("time", _one_twice),
+    ("time", _unknown),
+)
+READERS = {
+    **{name: getattr(mesoslip, name) for name in ("open_output", "slips", "regime", "response")},
+    "plot": mesoslip.plot,
+    "report": lambda path: mesoslip.report(path, path.with_suffix(".html")),
+    "export": lambda path: mesoslip.export(path, path.with_suffix(".xml")),
+    "fit": lambda path: mesoslip.fit(path, ROOT / "runs" / "klein.toml"),
+}
+
+
+@pytest.mark.parametrize(("where", "damage"), WRONG_ROWS)
+def test_rows_and_times_that_cannot_be_right_are_refused(output, where, damage):
+    with h5py.File(output, "r+") as file:
+        values = file[where][...]
+        damage(values)
+        file[where][...] = values
+    name = where.rpartition("/")[2]
+    for reader in ("open_output", "plot"):
+        with pytest.raises(mesoslip.FileError, match=f"damaged output.*{name}.* row "):
+            READERS[reader](output)
+
+
+@pytest.mark.parametrize("reader", READERS)
+def test_no_reader_takes_rows_of_unknown_realizations(output, reader):
+    with netCDF4.Dataset(output, "r+") as file:
+        file["slips/realization_index"][-1] = 7
+    with pytest.raises(mesoslip.FileError, match="realization_index is 7 in row"):
+        READERS[reader](output)
+
+
+def test_outputs_in_memory_are_checked_as_files_are(output):
+    tree = mesoslip.open_output(output)
+    parts = {
+        "realization_index is 0 in row": tree.isel(realization=slice(0)),
+        "time is": tree.isel(time=slice(None, None, -1)),
+        "variable /drive_displacement is missing": tree.isel(realization=0),
+        "group slips is missing": tree.drop_nodes("slips"),
+    }
+    for message, part in parts.items():
+        for reader in ("slips", "regime", "plot"):
+            with pytest.raises(mesoslip.FileError, match=message):
+                READERS[reader](part)
+
+
 THREADS = """
 import sys, threading
 import mesoslip

@@ -108,7 +108,8 @@ class Stored:
         part = {**(part or {}), **by_name}
         assert not self.part.keys() & part.keys()
         own = {name: index for name, index in part.items() if name in self.stored.dimensions}
-        return Stored(self.stored, self.attrs, {**self.part, **own})
+        # The values of a variable without these dimensions are not read again.
+        return Stored(self.stored, self.attrs, {**self.part, **own}) if own else self
 
     def __getitem__(self, index: Any) -> Stored:
         indices = index if isinstance(index, tuple) else (index,)

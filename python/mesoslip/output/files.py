@@ -16,7 +16,7 @@ from mesoslip.output.arrays import Arrays, Tree, arrays_of
 from mesoslip.output.file_locks import lock_held
 from mesoslip.output.hdf5 import LOCK, check_links
 from mesoslip.output.old_names import renamed
-from mesoslip.output.validity import check_layout, check_signature
+from mesoslip.output.validity import check_output, check_signature
 from mesoslip.output.variables import has_force
 
 if TYPE_CHECKING:
@@ -81,7 +81,9 @@ def _opened(path: str | Path, build: Callable[[netCDF4.Dataset], T]) -> Iterator
         try:
             check_links(path)
             tree = _built(path, stack, build)
-            check_layout(tree, path)
+            if "configuration" not in tree.attrs:
+                raise FileError(f"{path}: not an output of mesoslip")
+            check_output(tree, path)
         except DAMAGES as error:
             raise FileError(f"{path}: {lock_held(path) or 'a damaged netCDF-4 file'}") from error
         try:

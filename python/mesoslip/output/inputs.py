@@ -131,11 +131,14 @@ def opened(
 
 
 def _tree(output: object) -> xr.DataTree:
+    """An output in memory as a tree."""
     import xarray as xr
 
-    if isinstance(output, xr.Dataset):
-        # The dataset of a sweep, without groups.
-        return xr.DataTree(output)
-    if not isinstance(output, xr.DataTree):
+    from mesoslip.output.validity import check_output
+
+    # The dataset of a sweep has no groups.
+    tree = xr.DataTree(output) if isinstance(output, xr.Dataset) else output
+    if not isinstance(tree, xr.DataTree):
         raise FileError(f"{shown(output)}: is not an output; give its path or its DataTree")
-    return output
+    check_output(tree, "the output")
+    return tree

@@ -5,9 +5,11 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+import numpy as np
+
 from mesoslip.errors import FileError
 from mesoslip.output import variables
-from mesoslip.output.access import is_measured
+from mesoslip.output.access import group_of, is_measured
 from mesoslip.output.arrays import Tree
 from mesoslip.output.provenance import version
 
@@ -21,6 +23,16 @@ NEEDS = {
     "slip_traces": (("sample",), ("realization_index", "sample_time", *ROOT_NEEDS)),
     "avalanches": (("avalanche",), tuple(variables.AVALANCHES)[:6]),
     "snapshots": (("snapshot",), tuple(variables.SNAPSHOTS)[:7]),
+}
+
+# Times by group, and the ends of what starts then.
+TIMES = {
+    "": ("time", ""),
+    "slips": ("start_time", "end_time"),
+    "stages": ("stage_start_time", "stage_end_time"),
+    "slip_traces": ("sample_time", ""),
+    "avalanches": ("start_time", ""),
+    "snapshots": ("snapshot_time", ""),
 }
 
 
@@ -48,45 +60,92 @@ def _is_table(path: Path) -> bool:
     return path.suffix.lower() in {".csv", ".txt", ".dat", ".tsv"}
 
 
-def check_layout(tree: Tree, path: Path) -> None:
-    """Refuse an output without the variables that commands use, with their dimensions."""
-    if "configuration" not in tree.attrs:
-        raise FileError(f"{path}: not an output of mesoslip")
+def check_output(tree: Tree, name: str | Path) -> None:
+    """Refuse an output that lacks variables that commands use, or has them with other dimensions;
+    and one with rows of unknown realizations or times that go back."""
     wrong = [
-        f"attribute {name}"
-        for name in ("configuration", "title", "comment", "complete")
-        if not isinstance(tree.attrs.get(name, ""), str)
+        f"attribute {one}"
+        for one in ("configuration", "title", "comment", "complete")
+        if not isinstance(tree.attrs.get(one, ""), str)
     ]
     if variables.has_force(tree.data_vars):
-        root, slips = ROOT_NEEDS, {"slips": SLIPS}
-        if is_measured(tree):
-            # Quantities that were not measured are absent.
-            known = (*variables.TRACE, *variables.MEASURED)
-            root = tuple(name for name in known if name in tree.data_vars)
-            slips = {name: one for name, one in slips.items() if name in tree.children}
-        needed = {"": (("realization", "time"), root), **slips}
-        needed |= {name: one for name, one in NEEDS.items() if name in tree.children}
-        if is_measured(tree) and "stages" in needed:
-            needed["stages"] = (("stage",), tuple(variables.MEASURED_STAGES))
-        for group, (dimensions, names) in needed.items():
-            if group and group not in tree.children:
-                wrong.append(f"group {group}")
-                continue
-            data = tree.children[group].to_dataset() if group else tree.to_dataset()
-            wrong += [
-                f"variable {group}/{name}"
-                for name in names
-                if name not in data
-                or data[name].dims[: len(dimensions)] != dimensions
-                or data[name].dtype.kind not in "fiu"
-            ]
-        if not {"realization", "time"} <= tree.coords.keys():
-            wrong.append("coordinates realization and time")
+        wrong += _wrong_layout(tree)
     newer = _newer_version(tree.attrs.get("program_version"))
     if wrong and newer:
-        raise FileError(f"{path}: is of {newer}, and cannot be read: {wrong[0]} is different")
+        raise FileError(f"{name}: is of {newer}, and cannot be read: {wrong[0]} is different")
+    wrong = [f"{one} is missing or wrong" for one in wrong] or _wrong_rows(tree)
     if wrong:
-        raise FileError(f"{path}: a damaged netCDF-4 file: {wrong[0]} is missing or wrong")
+        raise FileError(f"{name}: a damaged output: {wrong[0]}")
+
+
+def _wrong_layout(tree: Tree) -> list[str]:
+    """Parts of the output of a run that are missing or of another form."""
+    wrong = [] if "configuration" in tree.attrs else ["attribute configuration"]
+    root, slips = ROOT_NEEDS, {"slips": SLIPS}
+    if is_measured(tree):
+        # Quantities that were not measured are absent.
+        known = (*variables.TRACE, *variables.MEASURED)
+        root = tuple(name for name in known if name in tree.data_vars)
+        slips = {name: one for name, one in slips.items() if name in tree.children}
+    needed = {"": (("realization", "time"), root), **slips}
+    needed |= {name: one for name, one in NEEDS.items() if name in tree.children}
+    if is_measured(tree) and "stages" in needed:
+        needed["stages"] = (("stage",), tuple(variables.MEASURED_STAGES))
+    for group, (dimensions, names) in needed.items():
+        if group and group not in tree.children:
+            wrong.append(f"group {group}")
+            continue
+        data = tree.children[group].to_dataset() if group else tree.to_dataset()
+        wrong += [
+            f"variable {group}/{name}"
+            for name in names
+            if name not in data
+            or data[name].dims[: len(dimensions)] != dimensions
+            or data[name].dtype.kind not in "fiu"
+        ]
+    if not {"realization", "time"} <= tree.coords.keys():
+        wrong.append("coordinates realization and time")
+    return wrong
+
+
+def _wrong_rows(tree: Tree) -> list[str]:
+    """Rows of realizations that the output does not have, and times that go back."""
+    wrong, count = [], tree.sizes.get("realization", 0)
+    for group, (name, end) in TIMES.items():
+        if group and group not in tree.children:
+            continue
+        data = group_of(tree, group) if group else tree.to_dataset()
+        if name not in data or (group and "realization_index" not in data):
+            continue
+        times = data[name].values
+        is_new = np.zeros(np.diff(times).shape, dtype=bool)
+        if group:
+            owners = data["realization_index"].values
+            is_new = np.diff(owners) > 0
+            is_wrong = ~((owners >= 0) & (owners < count))
+            is_wrong[1:] |= np.diff(owners) < 0
+            wrong += [
+                f"{group}/realization_index is {owners[row]} in row {row}; expected the indices "
+                f"of the {count} realizations in order"
+                for row in np.flatnonzero(is_wrong)[:1]
+            ]
+        # Only rows of catalogues may have the same time, as in a drive that stands still.
+        steps = np.diff(times)
+        is_wrong = ~np.isfinite(times)
+        is_wrong[1:] |= ~((steps >= 0 if group else steps > 0) | is_new)
+        wrong += [
+            f"{group}/{name} is {times[row]:.9g} s in row {row}".lstrip("/")
+            + (f" after {times[row - 1]:.9g} s" if row else "")
+            + "; expected times in order"
+            for row in np.flatnonzero(is_wrong)[:1]
+        ]
+        if end:
+            wrong += [
+                f"{group}/{end} is {data[end].values[row]:.9g} s in row {row}, which starts at "
+                f"{times[row]:.9g} s"
+                for row in np.flatnonzero(~(data[end].values >= times))[:1]
+            ]
+    return wrong
 
 
 def _newer_version(written: object) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
+from mesoslip.configuration import arguments
 from mesoslip.configuration.config import Config
 from mesoslip.configuration.reading import PathLike
 from mesoslip.execution.executors import ExecutorLike
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
+@arguments.checked(progress=arguments.function)
 def run(
     config: PathLike | Mapping[str, Any] | Config,
     *,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import subprocess
 import sys
 
@@ -64,6 +65,50 @@ def test_no_path(tmp_path, wrong):
         mesoslip.fit(tmp_path / "none.nc", wrong)
     with pytest.raises(MesoslipError):
         mesoslip.report(tmp_path / "none.nc", wrong)
+
+
+CONFIG = mesoslip.Config.from_dict(klein_tables(**SHORT))
+LAW = mesoslip.ThresholdLaw("gaussian", 0.1)
+ARGUMENTS = {
+    "text": mesoslip.Config.from_toml,
+    "tables": mesoslip.Config.from_dict,
+    "overrides": lambda wrong: mesoslip.Config.from_toml(CONFIG.to_toml(), overrides=wrong),
+    "changes": CONFIG.replace,
+    "tolerance": lambda wrong: mesoslip.cycle(CONFIG, tolerance=wrong),
+    "max_cycles": lambda wrong: mesoslip.cycle(CONFIG, max_cycles=wrong),
+    "progress": lambda wrong: mesoslip.run(CONFIG, progress=wrong),
+    "values": lambda wrong: mesoslip.branches(CONFIG, "contacts.delay", wrong),
+    "posteriors": mesoslip.compare_fits,
+    "config": mesoslip.SteadySliding,
+    "velocity": lambda wrong: mesoslip.SteadySliding(CONFIG, wrong),
+    "relative_width": lambda wrong: mesoslip.SteadySliding(CONFIG, relative_width=wrong),
+    "number": lambda wrong: mesoslip.Realization(CONFIG, wrong),
+    "coarsening": lambda wrong: mesoslip.Realization(CONFIG, coarsening=wrong),
+    "time": lambda wrong: mesoslip.Realization(CONFIG).advance_to(wrong),
+    "law": lambda wrong: mesoslip.ThresholdLaw(wrong, 0.1),
+    "minimum": lambda wrong: mesoslip.ThresholdLaw("gaussian", 0.1, wrong),
+    "samples": lambda wrong: mesoslip.ThresholdLaw("table", 0.1, samples=wrong),
+    "probability": LAW.quantile,
+    "threshold": LAW.density,
+    "twins": lambda wrong: mesoslip.lyapunov(CONFIG, twins=wrong),
+    "cluster": mesoslip.Dask,
+}
+
+
+@pytest.mark.parametrize("name", ARGUMENTS)
+@pytest.mark.parametrize("wrong", [10**400, 1j, {5: object}, object()], ids=type)
+def test_wrong_arguments_are_named(name, wrong):
+    if name in {"tables", "changes"} and isinstance(wrong, dict):
+        return
+    with pytest.raises(MesoslipError, match=name):
+        ARGUMENTS[name](wrong)
+
+
+@pytest.mark.parametrize("name", ["tolerance", "velocity", "relative_width", "time", "minimum"])
+@pytest.mark.parametrize("wrong", [math.nan, math.inf, "1"])
+def test_numbers_are_finite(name, wrong):
+    with pytest.raises(MesoslipError, match=f"{name} = .*: must be a finite number"):
+        ARGUMENTS[name](wrong)
 
 
 def test_catalogues_group_by_realization():

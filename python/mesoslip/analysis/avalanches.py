@@ -14,6 +14,7 @@ from mesoslip.analysis.avalanche_sizes import (
     fit_power_law,
     local_exponents,
 )
+from mesoslip.configuration import arguments
 from mesoslip.configuration.config import Config
 from mesoslip.configuration.units import from_cf_units
 from mesoslip.errors import FileError
@@ -88,6 +89,7 @@ SUMMARY = {
 MIN_LOCAL_COUNT = 50
 
 
+@arguments.checked(after=arguments.number(), min_force_ratio=arguments.number(0, 1))
 def avalanches(
     output: OutputLike, *, after: float = 0.0, min_force_ratio: float | None = None
 ) -> xr.Dataset:
@@ -131,6 +133,11 @@ def avalanches(
     return data.isel(avalanche=np.flatnonzero(chosen))
 
 
+@arguments.checked(
+    after=arguments.number(),
+    min_force_ratio=arguments.number(0, 1),
+    min_size=arguments.whole(1),
+)
 def avalanche_summary(
     output: OutputLike,
     *,

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from mesoslip.configuration import arguments
 from mesoslip.errors import ConfigError, Problem, RunError
 from mesoslip.execution.executors import ExecutorLike, as_executor, completed
 from mesoslip.execution.stop import Stop, StoppedError
@@ -165,6 +166,13 @@ def pooled(grown: Array, lengths: Array, starts: Array) -> Fit:
     return Fit(mean, math.sqrt(scatter * total / covered) / float(total))
 
 
+@arguments.checked(
+    realization=arguments.whole(0),
+    twins=arguments.whole(0),
+    duration=arguments.number(0, is_open=True),
+    displacement=arguments.number(),
+    progress=arguments.function,
+)
 def lyapunov(
     config: ConfigLike,
     *,

@@ -18,6 +18,7 @@ from mesoslip.campaign.point import (
 )
 from mesoslip.campaign.sweep_dataset import SweepDataset
 from mesoslip.campaign.sweep_plan import Plan, as_plan
+from mesoslip.configuration import arguments
 from mesoslip.configuration.reading import PathLike, as_path
 from mesoslip.errors import MesoslipError, RunError
 from mesoslip.execution.executors import (
@@ -253,6 +254,7 @@ class _Run:
         return Sweep(dataset, self._failures, self._stored, self._computed, missing, ending)
 
 
+@arguments.checked(progress=arguments.function)
 def sweep(
     plan: PathLike | Mapping[str, Any] | Plan,
     *,

@@ -14,7 +14,7 @@ from typing import Any, Self
 from pydantic import PrivateAttr, ValidationError, model_validator
 from pydantic_core import PydanticCustomError
 
-from mesoslip.configuration import checks
+from mesoslip.configuration import arguments, checks
 from mesoslip.configuration.contacts import contact_kind, is_in_both_engines
 from mesoslip.configuration.contacts.base import COMMON_KEYS, ContactKind, given_keys
 from mesoslip.configuration.contacts.tables import Contacts, Interaction
@@ -298,6 +298,7 @@ class Config(Table):
         return fine if fine < interval else None
 
     @classmethod
+    @arguments.checked(overrides=arguments.changes)
     def load(cls, path: PathLike, overrides: Iterable[Change] = ()) -> Config:
         """Read a TOML file and its base, apply changes, and check the result.
 
@@ -321,6 +322,7 @@ class Config(Table):
         return cls._checked(override(merged, overrides), str(path), base)
 
     @classmethod
+    @arguments.checked(tables=arguments.table, source=arguments.text)
     def from_dict(cls, tables: Mapping[str, Any], source: str = "configuration") -> Config:
         """Check a configuration given as nested tables; their ``base`` may name a file under them.
 
@@ -334,6 +336,12 @@ class Config(Table):
         return cls._checked(on_base(tables, source, Path()), source)
 
     @classmethod
+    @arguments.checked(
+        text=arguments.text,
+        source=arguments.text,
+        overrides=arguments.changes,
+        base=arguments.text,
+    )
     def from_toml(
         cls,
         text: str,
@@ -360,6 +368,7 @@ class Config(Table):
         config._base, config._dropped = base, tuple(merged.dropped)
         return config
 
+    @arguments.checked(changes=arguments.changes)
     def replace(self, *changes: Change, **tables: Any) -> Config:
         """A configuration with changes, checked like any other.
 

@@ -9,10 +9,28 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mesoslip import _core
+from mesoslip.configuration import arguments
 from mesoslip.configuration.kernel_parameters import Names, Parameters, named
 from mesoslip.configuration.threshold_laws import LAWS
 from mesoslip.configuration.threshold_laws.table import sample_problem
 from mesoslip.errors import MesoslipError
+
+
+@arguments.checked(
+    law=arguments.text,
+    relative_width=arguments.number(0),
+    minimum=arguments.number(),
+    samples=arguments.numbers,
+    weights=arguments.numbers,
+)
+def _check_fields(
+    law: str,
+    relative_width: float,
+    minimum: float,
+    samples: tuple[float, ...] | None = None,
+    weights: tuple[float, ...] | None = None,
+) -> None:
+    """Refuse fields of a law that are of another type."""
 
 
 @dataclass(frozen=True)
@@ -31,6 +49,7 @@ class ThresholdLaw:
     weights: tuple[float, ...] | None = None
 
     def __post_init__(self) -> None:
+        _check_fields(self.law, self.relative_width, self.minimum, self.samples, self.weights)
         if self.law not in LAWS:
             raise MesoslipError(
                 f"there is no threshold law {self.law!r}; there are {', '.join(LAWS)}"
@@ -45,6 +64,7 @@ class ThresholdLaw:
         """Probability that a draw is not rejected."""
         return self._kernel("survival", np.empty(0))[1]
 
+    @arguments.checked(probability=arguments.array)
     def quantile(self, probability: ArrayLike) -> NDArray[np.float64]:
         """Threshold that is exceeded with a probability.
 
@@ -59,10 +79,12 @@ class ThresholdLaw:
             raise MesoslipError(f"a probability must be above 0 and below 1, not {wrong[0]:g}")
         return self._evaluate("quantile", probability)
 
+    @arguments.checked(threshold=arguments.array)
     def density(self, threshold: ArrayLike) -> NDArray[np.float64]:
         """Probability density of the relative threshold."""
         return self._evaluate("density", threshold)
 
+    @arguments.checked(threshold=arguments.array)
     def survival(self, threshold: ArrayLike) -> NDArray[np.float64]:
         """Probability that a relative threshold is greater."""
         return self._evaluate("survival", threshold)

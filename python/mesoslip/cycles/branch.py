@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from mesoslip.configuration import arguments
 from mesoslip.configuration.config import Config
 from mesoslip.configuration.keys import key_kind
 from mesoslip.cycles.coordinates import SLIDER, Coordinates
@@ -72,6 +73,13 @@ class End(NamedTuple):
     amplitude_ratio: float
 
 
+@arguments.checked(
+    key=arguments.text,
+    values=arguments.numbers,
+    tolerance=arguments.number(0, 1, is_open=True),
+    max_cycles=arguments.whole(1),
+    progress=arguments.function,
+)
 def branches(
     config: ConfigLike,
     key: str,

@@ -8,6 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from mesoslip.configuration import arguments
 from mesoslip.configuration.config import Config
 from mesoslip.cycles.cycle_result import Cycle
 from mesoslip.cycles.section import Level, Motion
@@ -39,6 +40,11 @@ LONG = 1e9
 STARTS = ("relaxed", "steady", "uniform")
 
 
+@arguments.checked(
+    tolerance=arguments.number(0, 1, is_open=True),
+    max_cycles=arguments.whole(1),
+    progress=arguments.function,
+)
 def cycle(
     config: ConfigLike,
     *,

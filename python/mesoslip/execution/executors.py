@@ -95,6 +95,13 @@ class Dask(Executor):
 
     cluster: str | os.PathLike[str] | Client
 
+    def __post_init__(self) -> None:
+        if not isinstance(self.cluster, str | os.PathLike) and not hasattr(
+            self.cluster, "get_executor"
+        ):
+            message = "must be a distributed.Client, an address, or a scheduler file"
+            raise ConfigError([Problem("", "cluster", message, self.cluster)])
+
     @contextmanager
     def open(self, stop: Stop) -> Iterator[Pool]:  # noqa: ARG002
         if isinstance(self.cluster, str | os.PathLike):

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from mesoslip.analysis.even_traces import even_trace
 from mesoslip.analysis.noise import noise_level
 from mesoslip.analysis.sampled_slips import estimated_period
+from mesoslip.configuration import arguments
 from mesoslip.configuration.files import Change
 from mesoslip.configuration.reading import PathLike, as_path
 from mesoslip.configuration.units import to_si
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
+@arguments.checked(progress=arguments.function)
 def fit(
     output: OutputLike | Sequence[OutputLike],
     config: PathLike | Mapping[str, Any] | Plan,

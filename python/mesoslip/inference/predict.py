@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from mesoslip.configuration import arguments
 from mesoslip.configuration.config import Config
 from mesoslip.configuration.keys import key_kind
-from mesoslip.errors import FileError
+from mesoslip.errors import FileError, shown
 from mesoslip.execution.executors import ExecutorLike
 from mesoslip.execution.stop import StopRequest
 from mesoslip.inference.checks import compare
@@ -41,6 +42,7 @@ MAX_DEVIATION = 30.0
 RESAMPLINGS = 200
 
 
+@arguments.checked(after=arguments.number(), progress=arguments.function)
 def predict(
     posterior: OutputLike,
     output: OutputLike,
@@ -130,7 +132,7 @@ def as_posterior(posterior: OutputLike) -> xr.DataTree:
 
     tree = posterior if isinstance(posterior, xr.DataTree) else open_output(posterior)
     if "posterior" not in tree.children:
-        raise FileError(f"{posterior}: is not the result of a fit")
+        raise FileError(f"{shown(posterior)}: is not the result of a fit")
     return tree
 
 
@@ -168,6 +170,9 @@ class Score:
     """Standard error of the difference, by the number of predictions."""
 
 
+@arguments.checked(
+    posteriors=arguments.instance((list, tuple), "a list of results of fit or predict")
+)
 def compare_fits(posteriors: Sequence[OutputLike]) -> list[Score]:
     """Compare fits of the same traces by how probable their predictions make the traces.
 

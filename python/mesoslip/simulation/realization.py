@@ -9,10 +9,12 @@ import math
 import threading
 import time
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
 import numpy as np
 
+from mesoslip.configuration import arguments
+from mesoslip.configuration.config import Config
 from mesoslip.errors import RunError
 from mesoslip.simulation.kernel import Array, Kernel, Words
 from mesoslip.simulation.memory import check_memory
@@ -25,9 +27,6 @@ from mesoslip.simulation.recorded_tables import (
 )
 from mesoslip.simulation.start import START, End, follow
 from mesoslip.simulation.step_errors import COARSENING, StepErrors, step_errors
-
-if TYPE_CHECKING:
-    from mesoslip.configuration.config import Config
 
 # Reasons why a run is over, by the kernel's names.
 ENDINGS = {
@@ -137,6 +136,12 @@ class Realization(Recorded):
         Steps, evaluations and failed steps of the slider's integrator, if it has one.
     """
 
+    @arguments.checked(
+        config=arguments.instance(Config, "a Config"),
+        number=arguments.whole(0),
+        coarsening=arguments.number(0, is_open=True),
+        after=arguments.instance(End, "the end of another realization"),
+    )
     def __init__(
         self,
         config: Config,
@@ -197,6 +202,7 @@ class Realization(Recorded):
         self._kernel = kernel
         return kernel
 
+    @arguments.checked(advances=arguments.whole(1), work=arguments.number(0, is_open=True))
     def advance(self, advances: int | None = None, *, work: float | None = None) -> None:
         """Advance by one segment: a number of advances, an amount of work, or about 0.25 s.
 
@@ -248,6 +254,7 @@ class Realization(Recorded):
         coarse.close()
         self._coarse = None
 
+    @arguments.checked(time=arguments.number())
     def advance_to(self, time: float) -> None:
         """Advance until a time [s] is reached, or the run is over.
 
@@ -280,6 +287,7 @@ class Realization(Recorded):
             raise RunError(f"realization {self.number}: the run is not at its end")
         return End(self.config, self._kernel.save())
 
+    @arguments.checked(distance=arguments.number())
     def twin(self, distance: float) -> Realization:
         """Another realization that continues from here with the same random numbers.
 

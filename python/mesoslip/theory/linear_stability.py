@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mesoslip.configuration import arguments
 from mesoslip.errors import ConfigError, Problem, RunError
 from mesoslip.quantities import percent, with_unit
 from mesoslip.theory.contacts.steady import newborn_problems, steady_problems
@@ -159,6 +160,7 @@ class LinearStability(abc.ABC):
     def is_passive(self) -> bool:
         """Whether the force of steady contacts does not depend on the motion of the slider."""
 
+    @arguments.checked(frequency=arguments.array)
     def response(self, frequency: ArrayLike) -> Complex:
         """Λ(iω): contact force over displacement, of a slider moved at frequencies ω [N/m].
 

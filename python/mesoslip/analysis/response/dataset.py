@@ -32,6 +32,7 @@ from mesoslip.analysis.response.line import Line
 from mesoslip.analysis.response.restarts import restart_rows
 from mesoslip.analysis.response.steady import steady_line, steady_rows
 from mesoslip.analysis.response.steps import step_rows
+from mesoslip.configuration import arguments
 from mesoslip.errors import FileError
 from mesoslip.output.arrays import Arrays, Tree, Values, Variable, in_xarray
 from mesoslip.output.inputs import OutputLike, opened_run_arrays, several
@@ -42,6 +43,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
+@arguments.checked(normal_force=arguments.number(0, is_open=True))
 def response(
     output: OutputLike | Sequence[OutputLike],
     *,

@@ -14,20 +14,19 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mesoslip.configuration import arguments
+from mesoslip.configuration.config import Config
 from mesoslip.errors import Problem
 from mesoslip.theory.contacts.base import KNOWN_KEYS
 from mesoslip.theory.frequency_paths import Parts, Turns
 from mesoslip.theory.life_transforms import LifeTransforms, Lives
 from mesoslip.theory.linear_stability import OUT_OF_STEP, LinearStability
 from mesoslip.theory.lives import newborn_stretch
-
-if TYPE_CHECKING:
-    from mesoslip.configuration.config import Config
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
@@ -61,6 +60,11 @@ class SteadySliding(LinearStability):
         no velocity.
     """
 
+    @arguments.checked(
+        config=arguments.instance(Config, "a Config"),
+        velocity=arguments.number(),
+        relative_width=arguments.number(0, is_open=True),
+    )
     def __init__(
         self,
         config: Config,

@@ -1,0 +1,142 @@
+"""Checks of the arguments of public functions: one message for each wrong one, with its name."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import math
+import operator
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, ParamSpec, TypeVar
+
+from mesoslip.errors import ConfigError, Problem
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+# The checked value; a ValueError says what would be right.
+Check = Callable[[Any], Any]
+
+
+def checked(**checks: Check) -> Callable[[Callable[P, T]], Callable[P, T]]:
+    """Check arguments by name before a function is called, except those with their default."""
+
+    def decorate(function: Callable[P, T]) -> Callable[P, T]:
+        signature = inspect.signature(function)
+
+        @functools.wraps(function)
+        def call(*args: P.args, **kwargs: P.kwargs) -> T:
+            bound = signature.bind(*args, **kwargs)
+            problems = []
+            for name, check in checks.items():
+                value = bound.arguments.get(name, signature.parameters[name].default)
+                if value is signature.parameters[name].default:
+                    continue
+                try:
+                    bound.arguments[name] = check(value)
+                except ValueError as error:
+                    problems.append(Problem("", name, str(error), value))
+            if problems:
+                raise ConfigError(problems)
+            return function(*bound.args, **bound.kwargs)
+
+        return call
+
+    return decorate
+
+
+def number(
+    low: float = -math.inf, high: float = math.inf, *, is_open: bool = False
+) -> Callable[[Any], float]:
+    """A finite number in a range, whose lower end may not belong to it."""
+    wanted = "must be a finite number"
+    if low > -math.inf:
+        wanted += f" {'above' if is_open else 'of at least'} {low:g}"
+    if high < math.inf:
+        wanted += f" and at most {high:g}"
+
+    def check(value: Any) -> float:
+        try:
+            if isinstance(value, str | bytes | bool):
+                raise TypeError
+            found = float(value)
+        except (OverflowError, TypeError, ValueError):
+            raise ValueError(wanted) from None
+        if not (math.isfinite(found) and low <= found <= high) or (is_open and found == low):
+            raise ValueError(wanted)
+        return found
+
+    return check
+
+
+def whole(low: int) -> Callable[[Any], int]:
+    """A whole number of at least a bound that fits into 32 bits."""
+
+    def check(value: Any) -> int:
+        try:
+            if isinstance(value, bool):
+                raise TypeError
+            found = operator.index(value)
+        except TypeError:
+            found = low - 1
+        if not low <= found < 2**31:
+            raise ValueError(f"must be a whole number of at least {low}, below 2^31")
+        return found
+
+    return check
+
+
+def instance(kind: type[T] | tuple[type[T], ...], wanted: str) -> Callable[[Any], T]:
+    """An object of a type; ``wanted`` names it in the message."""
+
+    def check(value: Any) -> T:
+        if not isinstance(value, kind):
+            raise ValueError(f"must be {wanted}")
+        return value
+
+    return check
+
+
+def function(value: Any) -> Any:
+    """A function."""
+    if not callable(value) or isinstance(value, type):
+        raise ValueError("must be a function")
+    return value
+
+
+def numbers(value: Any) -> tuple[float, ...]:
+    """Several finite numbers."""
+    try:
+        if isinstance(value, str | bytes):
+            raise TypeError
+        return tuple(map(number(), value))
+    except (TypeError, ValueError):
+        raise ValueError("must be several finite numbers") from None
+
+
+def array(value: Any) -> Any:
+    """Real numbers of any shape."""
+    import numpy as np
+
+    try:
+        found = np.asarray(value)
+        if found.dtype.kind not in "fiu":
+            raise TypeError
+        return found.astype(float)
+    except (OverflowError, TypeError, ValueError):
+        raise ValueError("must be a number, or an array of numbers") from None
+
+
+text = instance(str, "a text")
+table = instance(Mapping, "nested tables")
+
+
+def changes(value: Any) -> tuple[Any, ...]:
+    """Changes of a configuration."""
+    wanted = 'must be changes such as "contacts.delay=1ms", or tables, in a list'
+    if isinstance(value, str | bytes | Mapping) or not isinstance(value, Iterable):
+        raise ValueError(wanted)
+    found = tuple(value)
+    if not all(isinstance(one, str | Mapping) for one in found):
+        raise ValueError(wanted)
+    return found

@@ -36,6 +36,20 @@ def test_files_in_many_styles_are_read_as_they_were_made(tmp_path, number):
     assert measurements.check_whole(case, measurements.write(case, tmp_path)) == []
 
 
+def test_data_sets_take_bounded_memory(tmp_path, monkeypatch):
+    path = tmp_path / "run.h5"
+    with h5py.File(path, "w") as file:
+        file["time"], file["force"] = np.arange(50.0), np.sin(np.arange(50.0))
+        for name in ("time", "force"):
+            file[name].attrs["units"] = {"time": "s", "force": "uN"}[name]
+        for number in range(12):
+            file.create_dataset(f"empty{number}", (230_000_000,), float, chunks=(10_000,))
+    assert mesoslip.read_trace(path).sizes["time"] == 50
+    monkeypatch.setattr("mesoslip.measured.reading.binary.MAX_BYTES", 500)
+    with pytest.raises(mesoslip.FileError, match="take more than"):
+        mesoslip.read_trace(path)
+
+
 @pytest.mark.parametrize("number", range(200))
 def test_damaged_files_give_no_wrong_numbers(tmp_path, number):
     case, changed, how = measurements.damage(f"test {number}")

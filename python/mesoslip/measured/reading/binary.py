@@ -151,6 +151,7 @@ def _hdf5(data: bytes) -> Iterator[Found]:
         if "program_version" in file.attrs and "configuration" in file.attrs:
             raise FileError("is an output of mesoslip, not a file of a measurement")
         seen: set[int] = set()
+        remaining = MAX_BYTES
         groups: list[tuple[str, Any]] = [("", file.id)]
         while groups:
             parent, group = groups.pop()
@@ -166,7 +167,15 @@ def _hdf5(data: bytes) -> Iterator[Found]:
                 if isinstance(target, h5py.h5g.GroupID):
                     groups.append((f"{name}/", target))
                 elif isinstance(target, h5py.h5d.DatasetID):
-                    yield from _data_set(name, h5py.Dataset(target))
+                    one = h5py.Dataset(target)
+                    if target.get_storage_size() > 0:
+                        remaining -= one.size * max(one.dtype.itemsize, np.dtype(float).itemsize)
+                    if remaining < 0:
+                        raise FileError(
+                            f"its data sets up to {name} take more than "
+                            f"{MAX_BYTES / 2**30:.3g} GiB; copy those of the measurement to a file"
+                        )
+                    yield from _data_set(name, one)
 
 
 def _data_set(name: str, one: Any) -> Iterator[Found]:
@@ -175,7 +184,8 @@ def _data_set(name: str, one: Any) -> Iterator[Found]:
     creation = one.id.get_create_plist()
     if creation.get_external_count() or creation.get_layout() == h5py.h5d.VIRTUAL:
         raise FileError(f"{name} has its data in another file")
-    if one.shape is None or one.size * one.dtype.itemsize > MAX_BYTES:
+    # A data set without data in the file may have any size.
+    if one.shape is None or one.id.get_storage_size() == 0:
         return
     if one.dtype.names:
         values = one[()]

@@ -50,6 +50,9 @@ class ThresholdLaw:
 
     def __post_init__(self) -> None:
         _check_fields(self.law, self.relative_width, self.minimum, self.samples, self.weights)
+        for name in ("samples", "weights"):
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, arguments.numbers(getattr(self, name)))
         if self.law not in LAWS:
             raise MesoslipError(
                 f"there is no threshold law {self.law!r}; there are {', '.join(LAWS)}"

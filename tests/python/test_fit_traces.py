@@ -11,7 +11,7 @@ import xarray as xr
 from conftest import klein_tables
 from mesoslip.errors import ConfigError, FileError
 from mesoslip.execution.stop import Stop
-from mesoslip.inference import checks, likelihood
+from mesoslip.inference import apparatus, checks, likelihood
 from mesoslip.inference.features import Feature
 from mesoslip.inference.fit import prepare as prepare_all
 from mesoslip.inference.fit import usable_summaries
@@ -25,6 +25,9 @@ from mesoslip.inference.wander import wandering
 from test_fit import FREE, NOISE, SMALL, experiment, few_draws, fit_tables
 
 TRUTH = {"contacts.static_force": 18e-6, "contacts.delay": 1e-3}
+
+
+STIFFNESS = {"slider.stiffness": {"from": 60, "to": 160, "prior": "logarithmic"}}
 
 
 def measured(tree, **known):
@@ -226,7 +229,7 @@ def test_coefficients_need_a_normal_force():
 
 @pytest.fixture(scope="module")
 def two_traces(tmp_path_factory):
-    """Traces of one interface on two springs, their files, and their fit."""
+    """Traces of one interface on two springs, their files, and their fit with a free stiffness."""
     folder = tmp_path_factory.mktemp("two")
     paths = []
     for stiffness in (97.0, 150.0):
@@ -236,14 +239,18 @@ def two_traces(tmp_path_factory):
 
         write(tree, paths[-1])
     with few_draws():
-        return paths, mesoslip.fit(paths, fit_tables(), executor=1)
+        return paths, mesoslip.fit(paths, fit_tables(free=FREE | STIFFNESS), executor=1)
 
 
 def test_several_traces_share_their_free_parameters(two_traces):
     """Each has the spring that it was recorded with."""
     _, posterior = two_traces
     assert posterior.attrs["traces"] == "spring97\nspring150"
-    for key, value in TRUTH.items():
+    assert (
+        "slider.stiffness is that of spring97, and 1.546 times that in spring150, as declared"
+        in posterior.attrs["notes"]
+    )
+    for key, value in (TRUTH | {"slider.stiffness": 97.0}).items():
         low, high = np.percentile(posterior["posterior"][key], [0.5, 99.5])
         assert low < value < high
         assert high < 1.7 * low
@@ -278,15 +285,42 @@ def test_a_trace_that_was_not_in_the_fit_is_predicted(two_traces, tmp_path, comm
     other = experiment(
         slider__stiffness=120.0, run__duration=3.0, contacts__static_force=24e-6, run__seed=8
     )
-    assert mesoslip.predict(posterior, same, executor=1).attrs["agreement_probability"] > 0.02
+    predicted = mesoslip.predict(posterior, same, executor=1)
+    assert predicted.attrs["agreement_probability"] > 0.02
+    assert "1.237 times that of the fit: the trace declares 120 N/m" in predicted.attrs["notes"]
     files = [tmp_path / "fit.nc", tmp_path / "other.nc", tmp_path / "predicted.nc"]
     write(posterior, files[0])
     write(other, files[1])
     status, printed, _ = command("fit", files[0], "--predict", files[1], "-o", files[2], "--quiet")
     assert status == 0
     assert "warning: In the model" in printed
+    assert "the trace declares 120 N/m" in printed
+    status, _, refused = command("fit", files[0], "fit.toml", "--predict", files[1])
+    assert status == 2
+    assert f"leave this one out: mesoslip fit {files[0]} --predict {files[1]}" in refused
+    status, _, refused = command("slips", files[0])
+    assert status == 2
+    assert "fit.nc: not an output of mesoslip run but a fit" in refused
     status, printed, _ = command("fit", "--compare", files[0], files[2])
     assert status == 2
+
+
+def test_a_free_key_of_the_apparatus_is_that_of_each_trace():
+    """The same everywhere, in the declared ratio, or as the predicted trace declares it."""
+    key, free = "slider.stiffness", ("slider.stiffness", "drive.velocity")
+    same = apparatus.of_several("ab", [{key: 97.0}, {}], free)
+    assert [one.values({key: 90.0}) for one in same] == [{key: 90.0}] * 2
+    with pytest.raises(FileError, match=r"c: has no slider\.stiffness, and the other traces have"):
+        apparatus.of_several("abc", [{key: 97.0}, {key: 150.0}, {}], free)
+    unknown = apparatus.of_predicted({key: 120.0, "drive.velocity": 1e-6}, {}, free)
+    assert unknown.values({key: 90.0, "contacts.delay": 1.0}) == {"contacts.delay": 1.0}
+    sentences = apparatus.predicted_sentences(unknown)
+    assert sentences[1] == (
+        "slider.stiffness is the 120 N/m that the trace declares, not that of the fit"
+    )
+    fitted = apparatus.of_predicted({}, {key: 97.0}, free)
+    assert fitted.values({key: 90.0}) == {key: 90.0}
+    assert not apparatus.predicted_sentences(fitted)
 
 
 def test_the_better_model_has_the_higher_score(two_traces):

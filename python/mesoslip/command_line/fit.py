@@ -77,7 +77,7 @@ def fit(
         target = posterior or config.with_name(f"{config.stem}.{predict.stem}.nc")
         _predict(config, predict, target, workers, quiet=quiet, as_json=as_json)
         return
-    check_arguments(traces, config)
+    check_arguments(traces, config, predict)
     path = posterior or Path("out") / f"{traces[0].stem}.posterior.nc"
     tree = _fitted(traces, config, path, changes or (), workers, quiet=quiet)
     _print(tree, as_json=as_json and predict is None)
@@ -136,13 +136,11 @@ def _predict(
             raise typer.Exit(stop.exit_status) from None
     writing.write(tree, path)
     probability = tree.attrs["agreement_probability"]
-    notes = _lines(tree, "warnings")
     if as_json:
-        print_json({"agreement_probability": probability, "warnings": notes})
+        print_json({"agreement_probability": probability} | _remarks(tree))
         return
     typer.echo(f"{path}: agreement of {trace} with its prediction: p = {probability:.2g}")
-    for one in notes:
-        typer.echo(f"warning: {one}")
+    _print_remarks(tree)
 
 
 def _print_scores(posteriors: Sequence[Path], *, as_json: bool) -> None:
@@ -175,7 +173,6 @@ def _print(tree: xr.DataTree, *, as_json: bool) -> None:
     from mesoslip.inference.posterior import table
 
     rows = table(tree)
-    warnings, notes = _lines(tree, "warnings"), _lines(tree, "notes")
     if as_json:
         print_json(
             {
@@ -193,30 +190,46 @@ def _print(tree: xr.DataTree, *, as_json: bool) -> None:
                     for row in rows
                 },
                 "agreement_probability": tree.attrs["agreement_probability"],
-                "warnings": warnings,
-                "notes": notes,
             }
+            | _remarks(tree)
         )
         return
     _print_rows(rows, tree.attrs)
-    for one in notes:
+    _print_remarks(tree)
+
+
+def _remarks(tree: xr.DataTree) -> dict[str, list[str]]:
+    """Warnings and notes, a sentence each."""
+    return {
+        name: [one for one in str(tree.attrs[name]).split("\n") if one]
+        for name in ("warnings", "notes")
+    }
+
+
+def _print_remarks(tree: xr.DataTree) -> None:
+    remarks = _remarks(tree)
+    for one in remarks["notes"]:
         typer.echo(one)
-    for one in warnings:
+    for one in remarks["warnings"]:
         typer.echo(f"warning: {one}")
 
 
-def _lines(tree: xr.DataTree, attribute: str) -> list[str]:
-    return [one for one in str(tree.attrs[attribute]).split("\n") if one]
-
-
-def check_arguments(traces: Sequence[Path], config: Path) -> None:
+def check_arguments(traces: Sequence[Path], config: Path, predict: Path | None = None) -> None:
     """Check that traces and a configuration are given, in this order."""
     from mesoslip.errors import FileError
+    from mesoslip.output import files
 
     if config.suffix == ".nc":
         raise FileError(f"{config}: is an output; a fit needs a TOML file with a table [fit.free]")
     if not traces:
         raise FileError("a fit needs an output with a trace, and a TOML file with [fit.free]")
+    if predict is not None:
+        with files.opened(traces[0]) as tree:
+            if "posterior" in tree.children:
+                raise FileError(
+                    f"{config}: the fit {traces[0]} has its configuration; leave this one out: "
+                    f"mesoslip fit {traces[0]} --predict {predict}"
+                )
 
 
 def _print_rows(rows: Sequence[Row], attributes: Mapping[Any, Any]) -> None:

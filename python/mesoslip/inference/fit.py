@@ -15,6 +15,7 @@ from mesoslip.analysis.sampled_slips import FoundSlips
 from mesoslip.execution.executors import ExecutorLike
 from mesoslip.execution.stop import StopRequest
 from mesoslip.execution.store import Store
+from mesoslip.inference.apparatus import of_several
 from mesoslip.inference.checks import Agreement, compare, information
 from mesoslip.inference.fit_plan import Plan
 from mesoslip.inference.rounds import Estimate, estimate_posterior
@@ -137,7 +138,12 @@ def prepare(trees: Sequence[xr.DataTree], names: Sequence[str], plan: Plan) -> S
     if several:
         # One interface has one correlation length of its strength: the longest is measured best.
         length = float(np.max([one.wander_length for one in experiments]))
-        experiments = [replace(one, wander_length=length) for one in experiments]
+        declared = [one.apparatus.declared for one in experiments]
+        own = of_several([one.name for one in experiments], declared, plan.prior.keys)
+        experiments = [
+            replace(one, wander_length=length, apparatus=apparatus)
+            for one, apparatus in zip(experiments, own, strict=True)
+        ]
     return Simulator(tuple(experiments), plan.prior, plan.seed, plan.coarse_count)
 
 

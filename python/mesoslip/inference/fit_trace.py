@@ -45,7 +45,8 @@ def fit(
     output
         Output with the trace, measured (see `read_trace`) or simulated, or several outputs; of each
         the first realization is fitted. Of several traces each has its own drive and spring, as far
-        as they are known, and all have the free parameters in common.
+        as they are known, and all have the free parameters in common; a free stiffness or velocity
+        is that of the first trace, and of the others in the ratio of the declared ones.
     config
         The known parameters, and the free ones in a table ``[fit.free]``: a TOML file, nested
         tables, or a `mesoslip.inference.fit_plan.Plan`. Velocity of the drive, stiffness of the

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from mesoslip.analysis.sampled_slips import FoundSlips
 from mesoslip.configuration.units import cf_units
+from mesoslip.inference import apparatus
 from mesoslip.inference.checks import (
     DETERMINED,
     UNDETERMINED,
@@ -182,6 +183,9 @@ def trace_groups(prediction: Prediction, start: float, number: int) -> dict[str,
 def _notes(fitted: FitResult) -> Iterator[str]:
     """Sentences on assumptions, corrections, and summaries that are left out."""
     yield from fitted.plan.assumed
+    experiments = fitted.simulator.experiments
+    names = [one.name for one in experiments]
+    yield from apparatus.sentences(names, [one.apparatus for one in experiments])
     for prediction in fitted.predictions:
         one = prediction.experiment
         name = f"{one.name}: " if one.name else ""
@@ -281,12 +285,18 @@ def _parameters(fitted: FitResult, needs: dict[str, tuple[str, ...]]) -> xr.Data
 
     prior, draws = fitted.plan.prior, fitted.estimate.draws
     groups = list(fitted.information)
+    declared = fitted.simulator.experiments[0].apparatus.declared
     percentiles = np.percentile(prior.values(draws), PERCENTILES, axis=0).T
     return xr.Dataset(
         {
             "value": (("parameter", "percentile"), percentiles),
             "units": ("parameter", [one.unit for one in prior.free]),
             "follows_from": ("parameter", ["\n".join(needs[one.key]) for one in prior.free]),
+            "declared": (
+                "parameter",
+                [declared.get(one.key, math.nan) for one in prior.free],
+                {"long_name": "value that the first trace declares, in SI"},
+            ),
             "low": ("parameter", [one.low for one in prior.free]),
             "high": ("parameter", [one.high for one in prior.free]),
             "is_logarithmic": ("parameter", [int(one.is_logarithmic) for one in prior.free]),

@@ -16,6 +16,7 @@ from mesoslip.configuration.keys import key_kind
 from mesoslip.errors import FileError, shown
 from mesoslip.execution.executors import ExecutorLike
 from mesoslip.execution.stop import StopRequest
+from mesoslip.inference.apparatus import of_predicted, predicted_sentences
 from mesoslip.inference.checks import compare
 from mesoslip.inference.fit import PREDICTIONS, predict_traces, usable_summaries
 from mesoslip.inference.fit_plan import Plan
@@ -60,7 +61,8 @@ def predict(
         Result of `fit`, or its file.
     output
         Output with the trace. Its drive and spring are those that it was recorded with, as far as
-        they are known, or those of the fit.
+        they are known, or those of the fit. A free one is in the ratio of what this trace and the
+        fitted one declare; if the fitted one declares nothing, it is what this trace declares.
     after
         Time from which the trace is used [s].
     executor, progress, stop
@@ -89,6 +91,8 @@ def predict(
     experiment = prepare(trace, plan, trace_name(output, trace))
     if WANDER in prior.keys:
         experiment = replace(experiment, wander_length=float(fitted.attrs["wander_length"]))
+    own = of_predicted(experiment.apparatus.declared, _declared_in(fitted), prior.keys)
+    experiment = replace(experiment, apparatus=own)
     simulator = Simulator((experiment,), prior, seed)
     observed, left_out = usable_summaries(simulator)
     simulations = Simulations(
@@ -109,7 +113,9 @@ def predict(
         "disagreeing": "\n".join(agreement.disagreeing),
         "traces": experiment.name,
         "predicted": "true",
-        "notes": "prediction of a trace that was not in the fit",
+        "notes": "\n".join(
+            ["prediction of a trace that was not in the fit", *predicted_sentences(own)]
+        ),
         "warnings": "In the model " + "; ".join(agreement.sentences)
         if agreement.is_rejected
         else "",
@@ -155,6 +161,15 @@ def prior_of(posterior: xr.DataTree) -> Prior:
             )
         )
     return Prior(tuple(found))
+
+
+def _declared_in(posterior: xr.DataTree) -> dict[str, float]:
+    """The values of free keys that the first trace of a fit declares."""
+    data = posterior["parameters"].to_dataset()
+    if "declared" not in data:
+        return {}
+    pairs = zip(data["parameter"].values.tolist(), data["declared"].values.tolist(), strict=True)
+    return {key: value for key, value in pairs if math.isfinite(value)}
 
 
 @dataclass(frozen=True)

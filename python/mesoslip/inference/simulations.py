@@ -97,7 +97,7 @@ class Simulator:
         for one in self.experiments:
             known += [one.config.to_toml(), one.noise, one.wander_length, one.summarizer.period]
             sampling = one.sampling
-            known += [sampling.start, sampling.block, sampling.lead]
+            known += [sampling.start, sampling.block, sampling.lead, one.apparatus]
             state += [sampling.times, one.force]
         text = repr((program(), *known)).encode()
         return hashlib.sha256(text + np.concatenate(state).tobytes()).hexdigest()

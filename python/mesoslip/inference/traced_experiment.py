@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -15,8 +14,9 @@ from mesoslip.analysis.apparatus import first_velocity
 from mesoslip.analysis.even_traces import INTERVAL_TOLERANCE
 from mesoslip.analysis.sampled_slips import estimated_period
 from mesoslip.configuration.config import Config
-from mesoslip.errors import ConfigError, FileError, Problem, RunError
+from mesoslip.errors import ConfigError, FileError, RunError
 from mesoslip.execution.stop import StoppedError, StopRequest
+from mesoslip.inference.apparatus import Apparatus, declared_values, own_config
 from mesoslip.inference.fit_plan import Plan
 from mesoslip.inference.noise import Noise, cleaned
 from mesoslip.inference.prior import WANDER
@@ -37,8 +37,6 @@ Words = NDArray[np.unsignedinteger[Any]]
 MIN_NOISE = 5e-4
 # Minimum number of samples of a trace.
 MIN_SAMPLES = 200
-# Maximum relative difference between a trace and its configuration.
-MAX_DIFFERENCE = 0.01
 # Minimum number of samples in a period of the setup after averaging.
 SAMPLES_PER_PERIOD = 24
 # Minimum initial force, over the maximum force, of a trace that does not begin with the first
@@ -131,6 +129,7 @@ class Experiment:
     """Correlation length of the strength along the track [m]."""
     force: Array
     """The measured force [N], corrected and reduced by the sampling."""
+    apparatus: Apparatus
     corrections: tuple[str, ...] = ()
     """Corrections of the trace, a sentence each."""
 
@@ -147,7 +146,8 @@ class Experiment:
         ``words`` determine the random numbers.
         """
         try:
-            config = self.config.replace({**changes, "run.seed": int(words[0]) >> 2})
+            own = self.apparatus.values(changes)
+            config = self.config.replace({**own, "run.seed": int(words[0]) >> 2})
             run = Realization(config, 0, estimates_errors=False)
             while not run.finished and run.breaks < MAX_BREAKS:
                 if stop.is_set():
@@ -186,7 +186,8 @@ def prepare(tree: xr.DataTree, plan: Plan, name: str = "", number: int = 0) -> E
                 "trace with the normal force (--normal-force)"
             )
         raise FileError(f"{_named(name)}the output has no trace of the spring force")
-    known = _checked(tree, plan)
+    declared = declared_values(tree)
+    known = own_config(declared, plan)
     velocity = first_velocity(known) or 1.0
     root = tree.to_dataset()
     time = root["time"].values.astype(float)
@@ -238,7 +239,17 @@ def prepare(tree: xr.DataTree, plan: Plan, name: str = "", number: int = 0) -> E
     length = math.nan
     if WANDER in plan.prior.keys:
         length = measured_length(summarizer, reduced, abs(velocity))
-    return Experiment(name, config, sampling, noise, summarizer, length, reduced, corrections)
+    return Experiment(
+        name,
+        config,
+        sampling,
+        noise,
+        summarizer,
+        length,
+        reduced,
+        Apparatus(declared),
+        corrections,
+    )
 
 
 def _is_loaded(force: Array, scale: float) -> bool:
@@ -285,28 +296,3 @@ def _period(plan: Plan, config: Config, time: Array, force: Array, noise: float)
     if known > 0 and (is_known or not math.isfinite(estimated)):
         return known
     return estimated if math.isfinite(estimated) else float(time[-1]) / 100
-
-
-def _checked(tree: xr.DataTree, plan: Plan) -> Config:
-    """The configuration of the apparatus of a trace.
-
-    If there are several traces, each has the drive and the spring that it was recorded with. A
-    single trace must not contradict the configuration.
-    """
-    traced = tomllib.loads(tree.attrs["configuration"])
-    free, problems, own = set(plan.prior.keys), [], {}
-    # Other keys of a simulated trace are not compared: a measured trace does not have them.
-    for table, name in (("drive", "velocity"), ("slider", "stiffness")):
-        measured = traced.get(table, {}).get(name)
-        given = getattr(getattr(plan.config, table), name, None)
-        key = f"{table}.{name}"
-        if measured is None or given is None or key in free:
-            continue
-        if plan.has_several:
-            own[key] = measured
-        elif abs(measured - given) > MAX_DIFFERENCE * abs(measured):
-            message = f"is {measured:g} in the trace; change it, or make it free in [fit.free]"
-            problems.append(Problem("configuration", key, message, given))
-    if problems:
-        raise ConfigError(problems)
-    return plan.config.replace(own) if own else plan.config

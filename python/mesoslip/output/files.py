@@ -15,6 +15,7 @@ from mesoslip.errors import FileError
 from mesoslip.output.arrays import Arrays, Tree, arrays_of
 from mesoslip.output.file_locks import lock_held
 from mesoslip.output.hdf5 import LOCK, check_links
+from mesoslip.output.kinds import KINDS
 from mesoslip.output.old_names import renamed
 from mesoslip.output.validity import check_output, check_signature
 from mesoslip.output.variables import has_force
@@ -156,8 +157,9 @@ def opened_run(path: str | Path) -> Iterator[xr.DataTree]:
 def check_run(tree: Tree, path: str | Path) -> None:
     """Refuse an output that is not of ``mesoslip run``."""
     if not has_force(tree.data_vars):
-        kind = " but of mesoslip sweep" if "status" in tree.data_vars else ""
-        raise FileError(f"{path}: not an output of mesoslip run{kind}")
+        found = [kind.description for kind in KINDS.values() if kind.is_of(tree)][:1]
+        but = f" but {found[0]}" if found else ""
+        raise FileError(f"{path}: not an output of mesoslip run{but}")
 
 
 def is_of_another(path: Path, config: Config) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 
 import mesoslip
 import numpy as np
@@ -273,7 +274,12 @@ def test_a_fit_of_two_traces_is_drawn_and_reported(two_traces, tmp_path):
     mesoslip.plot(posterior, tmp_path / "misfit.png", view="misfit")
     assert (tmp_path / "misfit.png").stat().st_size > 20_000
     mesoslip.report(posterior, tmp_path / "fit.html")
-    assert "free, 5 to 40" in (tmp_path / "fit.html").read_text()
+    page = (tmp_path / "fit.html").read_text()
+    assert "free, 5 to 40" in page
+    # As many digits as the interval has, and no duration of the base.
+    force = re.search(r"F_s = ([\d.]+) µN", page)[1]
+    assert len(force.replace(".", "")) <= 4
+    assert "µm/s for" not in page
 
 
 def test_a_trace_that_was_not_in_the_fit_is_predicted(two_traces, tmp_path, command):

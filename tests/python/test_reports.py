@@ -13,7 +13,9 @@ import xarray as xr
 from conftest import ROOT, klein_tables, long
 from kinds import KINDS, configuration
 from mesoslip.output.kinds import KINDS as OUTPUTS
+from mesoslip.plots.views.run import caption
 from mesoslip.quantities import column
+from mesoslip.reports.method_paragraphs import cycle_method
 from mesoslip.reports.sections import SECTIONS
 
 pytestmark = pytest.mark.usefixtures("few_replicas")
@@ -231,3 +233,32 @@ def test_the_command_writes_a_page(tmp_path, command):
     assert status == 2
     assert "is read by the command" in errors
     assert command("report", tmp_path / "none.nc")[0] == 2
+
+
+def test_a_method_of_the_theory_has_no_duration(klein):
+    """A settled motion is of no run, and an irregular one has no period."""
+    found = mesoslip.onset(klein()).attrs["configuration"]
+    config = mesoslip.Config.from_toml(found)
+    tree = xr.DataTree(xr.Dataset(attrs={"settled_motion": "periodic"}))
+    text = " ".join(cycle_method(tree, config.replace("run.engine=me", "run.duration=1e9")))
+    assert "until period and peaks did not change" in text
+    assert "1e" not in text.split("drive moves")[1]
+    assert " for " not in text.split("drive moves")[1]
+    tree.attrs["settled_motion"] = "irregular"
+    text = " ".join(cycle_method(tree, config))
+    assert "did not change" not in text
+    assert "means over passages" in text
+
+
+def test_a_caption_names_the_panels_that_there_are(klein_run):
+    assert caption(klein_run) == (
+        "force, velocity and detached contacts, with the largest slip beside them"
+    )
+    measured = xr.DataTree.from_dict(
+        {
+            "/": klein_run.to_dataset().drop_vars("detached_contacts"),
+            "/slips": klein_run["slips"].to_dataset().isel(slip=slice(0)),
+        }
+    )
+    measured.attrs["origin"] = "measured"
+    assert caption(measured) == "force and velocity"

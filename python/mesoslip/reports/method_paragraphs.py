@@ -66,13 +66,21 @@ def curve_method(_: xr.DataTree, config: Config) -> Iterator[str]:
     yield from _contacts(config)
 
 
-def cycle_method(_: xr.DataTree, config: Config) -> Iterator[str]:
+# Ends of the sentence on the iteration to each settled motion.
+SETTLED = {
+    "periodic": "until period and peaks did not change any more",
+    "irregular": "without reaching a period: numbers of the motion are means over passages",
+    "smooth": "until the oscillation had decayed",
+}
+
+
+def cycle_method(tree: xr.DataTree, config: Config) -> Iterator[str]:
     yield from _engine(config)
     yield (
         "It was iterated from one passage of the spring force through a section to the next, "
-        "until period and peaks did not change any more."
+        f"{SETTLED[str(tree.attrs['settled_motion'])]}."
     )
-    yield from model(config)
+    yield from model(config, is_run=False)
 
 
 def branches_method(tree: xr.DataTree, config: Config) -> Iterator[str]:
@@ -82,7 +90,7 @@ def branches_method(tree: xr.DataTree, config: Config) -> Iterator[str]:
         "to the next, from the state of the value before, up and down over "
         f"{tree.attrs['continued_key']}."
     )
-    yield from model(config)
+    yield from model(config, is_run=False)
 
 
 def lyapunov_method(tree: xr.DataTree, config: Config) -> Iterator[str]:
@@ -100,7 +108,7 @@ def steady_method(_: xr.DataTree, config: Config) -> Iterator[str]:
         "with mesoslip [@mesoslip] for infinitely many contacts, from the survival of contacts "
         "over their lives and its change under a small oscillation of the slider."
     )
-    yield from model(config)
+    yield from model(config, is_run=False)
 
 
 def onset_method(_: xr.DataTree, config: Config) -> Iterator[str]:
@@ -109,7 +117,7 @@ def onset_method(_: xr.DataTree, config: Config) -> Iterator[str]:
         "force curve of the master equation [@braun2010], for contacts that break one after "
         "another and for a film that melts at once."
     )
-    yield from model(config)
+    yield from model(config, is_run=False)
 
 
 def sweep_method(tree: xr.DataTree, config: Config) -> Iterator[str]:
@@ -127,7 +135,12 @@ def fit_method(tree: xr.DataTree, config: Config) -> Iterator[str]:
 
     rows = posterior.table(tree)
     estimates = "; ".join(_estimate(one) for one in rows)
-    medians = {one.key: one.percentiles[2] for one in rows if key_kind(one.key) is not None}
+    # With the digits that the intervals have.
+    medians = {
+        one.key: float(f"{one.percentiles[2]:.{one.digits}g}")
+        for one in rows
+        if key_kind(one.key) is not None
+    }
     whole = {key for key in medians if (kind := key_kind(key)) is not None and kind.is_whole}
     values = {key: round(one) if key in whole else one for key, one in medians.items()}
     note = "Values of free keys are medians of the posterior."
@@ -142,7 +155,7 @@ def fit_method(tree: xr.DataTree, config: Config) -> Iterator[str]:
         "reduced to the same summaries, and parameters are drawn from a synthetic likelihood "
         "of these [@wood2010] by an affine-invariant ensemble sampler [@foreman2013]."
     )
-    yield from model(config)
+    yield from model(config, is_run=False)
     yield note
 
 
@@ -181,12 +194,12 @@ def measured_method(tree: xr.DataTree) -> str:
     )
 
 
-def model(config: Config) -> Iterator[str]:
-    """Sentences on contacts, slider and drive."""
+def model(config: Config, *, is_run: bool = True) -> Iterator[str]:
+    """Sentences on contacts, slider and drive, which has a duration in a run only."""
     yield from _contacts(config)
     yield INITIAL[config.contacts.initial]
     yield slider_sentence(config.slider)
-    yield _drive(config.drive, config)
+    yield _drive(config.drive, config) if is_run else f"{_motion(config.drive)}."
 
 
 def _engine(config: Config) -> Iterator[str]:

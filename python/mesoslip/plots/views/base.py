@@ -77,6 +77,8 @@ class View:
     """Whether it is for an output, where views of one name are for different outputs of a kind."""
     movie: Callable[[xr.DataTree, Options], Movie] | None = None
     """Makes a movie of an output; None if there is none."""
+    caption: Callable[[xr.DataTree], str] | None = None
+    """Contents of the picture of an output; None if they are those of the summary."""
     takes_arrays: bool = False
     """Whether `mesoslip.output.arrays.Arrays` has all that it needs of an output."""
 

@@ -13,7 +13,7 @@ from mesoslip.output.arrays import Tree
 from mesoslip.plots.axis import HorizontalAxis, horizontal_axis
 from mesoslip.plots.close_up import draw_slip, largest_slip
 from mesoslip.plots.curves import about_realizations, curve, draw_curves, others_behind
-from mesoslip.plots.extent import Extent
+from mesoslip.plots.extent import EVERYTHING, Extent
 from mesoslip.plots.marks import draw_marks
 from mesoslip.plots.printing import is_narrow
 from mesoslip.plots.style import (
@@ -31,6 +31,7 @@ from mesoslip.plots.trace_variables import NAMES, force_of, is_known
 from mesoslip.plots.views.base import EXTENT, Options, View
 
 BELOW = ("velocity", "detached_contacts")
+BESIDE = "with the largest slip beside them"
 
 
 def draw(tree: Tree, options: Options, figure: Canvas | None) -> Canvas:
@@ -118,6 +119,13 @@ def _known_below(trees: Sequence[Tree]) -> list[str]:
     return [name for name in BELOW if any(is_known(tree, name) for tree in trees)]
 
 
+def caption(tree: Tree) -> str:
+    """The panels that an output has."""
+    *others, last = ["force", *(name.replace("_", " ") for name in _known_below([tree]))]
+    panels = f"{', '.join(others)} and {last}" if others else last
+    return panels if largest_slip(tree, EVERYTHING) is None else f"{panels}, {BESIDE}"
+
+
 def _height(below: Sequence[str]) -> float:
     """Height of a figure with panels below the force [inch]."""
     return 2.8 + 1.2 * len(below)
@@ -186,7 +194,8 @@ def _has_velocity(tree: Tree) -> bool:
 VIEW = View(
     name="run",
     kind="run",
-    summary="force, velocity and detached contacts, with the largest slip beside them",
+    summary=f"force, velocity and detached contacts, {BESIDE}",
+    caption=caption,
     draw_all=draw,
     panel=draw_force,
     options=EXTENT,

@@ -25,15 +25,16 @@ def pictures(subjects: Sequence[Subject]) -> Section:
         blocks.append(picture_of_all(subjects, "All outputs over each other", options=options))
     for subject in subjects:
         tree = subject.tree
-        summary = view_of(tree, None, options).summary
+        view = view_of(tree, None, options)
+        summary = view.summary if view.caption is None else view.caption(tree)
         caption = f"{summary[0].upper()}{summary[1:]}"
         blocks.append(picture_of(subjects, subject, caption, options=options))
         if "layer_displacement" in tree.data_vars:
             caption = "Waves in the slider during its largest slip"
             blocks.append(picture_of(subjects, subject, caption, "layers", options))
         if "snapshots" in tree.children and group_of(tree, "snapshots").sizes["snapshot"]:
-            caption, view = "Stretches of the contacts and their thresholds", "contacts"
+            caption, name = "Stretches of the contacts and their thresholds", "contacts"
             if is_on_lattice(group_of(tree, "snapshots")):
-                caption, view = "Contacts on their lattice", "lattice"
-            blocks.append(picture_of(subjects, subject, caption, view))
+                caption, name = "Contacts on their lattice", "lattice"
+            blocks.append(picture_of(subjects, subject, caption, name))
     return Section("Pictures", tuple(blocks))

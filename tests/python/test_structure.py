@@ -393,3 +393,11 @@ def test_no_files_import_each_other(tmp_path):
         stream.write("\n\ndef planted():\n    import mesoslip.plots.plot\n")
     (found,) = circles(copy)
     assert {"plots/style.py", "plots/plot.py"} <= set(found)
+
+
+@pytest.mark.parametrize("folder", ["fit", "measured", "sweeps", "maps"])
+def test_examples_are_installed_with_their_data(folder):
+    text = (ROOT / "runs" / "meson.build").read_text()
+    listed = re.search(rf"'{folder}': \[(.*?)\]", text, re.DOTALL)[1]
+    names = {one.name for one in (ROOT / "runs" / folder).iterdir() if one.is_file()}
+    assert set(re.findall(r"'(.*?)'", listed)) == names

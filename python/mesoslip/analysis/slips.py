@@ -31,8 +31,8 @@ ADDED = {
     "stick_duration": ("s", "time since the end of the slip before"),
     "loading_rate": ("N s-1", "rate of the force while the slider sticks"),
     "loading_stiffness": ("N m-1", "growth of the force over the displacement of the drive"),
-    "creep_displacement": ("m", "displacement of the slider between the slips"),
-    "creep_share": ("1", "its share of the displacement of the drive"),
+    "creep_displacement": ("m", "displacement of the slider from its rest to the slip"),
+    "creep_share": ("1", "its share of the displacement of the drive in that time"),
     "peak_fall_rate": ("N s-1", "maximum rate at which the force fell in the slip"),
 }
 # Those that need the trace.
@@ -271,7 +271,7 @@ def _stick_columns(
         if "drive_displacement" in root:
             drive = root["drive_displacement"].values[owner].astype(float)[known]
             drive = drive if np.isfinite(drive).all() else None
-        ends = ("start_time", "end_time", "force_before", "force_after")
+        ends = ("start_time", "end_time", "force_before")
         phases = stick_phases(
             time[known],
             force[known],

@@ -1,9 +1,13 @@
 """Stick phases between slips: duration, growth of the force, and creep before a slip.
 
-While the slider sticks, the force grows by the stiffness times the displacement of the drive. If it
-grows less, the slider creeps: its displacement is
+At the end of a slip the slider may overshoot, and rebounds before it rests. While it sticks, the
+force grows by the stiffness times the displacement of the drive. If it grows less, the slider
+creeps: its displacement is
 
     X = X_d - F/K.
+
+Loading and creep are measured from the rest after the rebound, which takes as long as the slip. The
+force there is that of the line of the loading, on which ringing has little influence.
 """
 
 from __future__ import annotations
@@ -16,10 +20,14 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-# Part of a stick phase in which the loading is measured, after ringing and before creep, and
-# minimum number of samples in it.
+# Part of a stick phase in which the loading is measured, after the rebound and before creep, its
+# minimum length over that of the phase, and minimum number of samples in it.
 LOADING = (0.1, 0.5)
+MIN_LOADING = 0.2
 MIN_SAMPLES = 4
+# Maximum scatter of the force about the line of the loading, over the change along the line: a
+# slider that swings by more does not rest.
+MAX_SCATTER = 0.25
 # Minimum displacement over path length of a drive that moves in one direction.
 MIN_DIRECTNESS = 0.9
 
@@ -35,9 +43,9 @@ class StickPhases:
     loading_stiffness: Array
     """The same over the displacement of the drive [N/m]."""
     creep_displacement: Array
-    """Displacement of the slider in the stick phase, along the drive [m]."""
+    """Displacement of the slider from the rest after the rebound on, along the drive [m]."""
     creep_share: Array
-    """Its share of the displacement of the drive in the stick phase."""
+    """Its share of the displacement of the drive in that time."""
 
 
 def stick_phases(
@@ -46,7 +54,6 @@ def stick_phases(
     start_time: Array,
     end_time: Array,
     force_before: Array,
-    force_after: Array,
     *,
     drive: Array | None = None,
     stiffness: float = math.nan,
@@ -56,31 +63,33 @@ def stick_phases(
     A stiffness that is NaN stands for the median of the loading stiffness.
     """
     number = len(start_time)
-    duration, rate, measured, driven = (np.full(number, np.nan) for _ in range(4))
+    duration, rate, measured, driven, risen = (np.full(number, np.nan) for _ in range(5))
     duration[1:] = start_time[1:] - end_time[:-1]
-    first = np.searchsorted(time, end_time[:-1] + LOADING[0] * duration[1:])
+    rebound = np.maximum(LOADING[0] * duration[1:], end_time[:-1] - start_time[:-1])
+    first = np.searchsorted(time, end_time[:-1] + rebound)
     after = np.searchsorted(time, end_time[:-1] + LOADING[1] * duration[1:], "right")
+    has_rest = LOADING[1] * duration[1:] - rebound >= MIN_LOADING * duration[1:]
     for slip, (one, two) in enumerate(zip(first, after, strict=True), 1):
         span = slice(one, two)
-        known = np.isfinite(force[span])
-        if np.count_nonzero(known) < MIN_SAMPLES:
+        if not has_rest[slip - 1] or np.count_nonzero(np.isfinite(force[span])) < MIN_SAMPLES:
             continue
+        known = np.isfinite(force[span])
         since = time[span][known] - time[one]
-        rate[slip] = np.polyfit(since, force[span][known], 1)[0]
+        slope, at_rest = np.polyfit(since, force[span][known], 1)
+        scatter = float(np.std(force[span][known] - at_rest - slope * since))
+        if scatter > MAX_SCATTER * abs(slope) * since[-1]:
+            continue
+        rate[slip] = slope
         if drive is None:
             continue
         between = drive[np.searchsorted(time, end_time[slip - 1]) : two]
         velocity = np.polyfit(since, drive[span][known], 1)[0]
         if velocity != 0 and _is_one_way(between):
             measured[slip] = rate[slip] / velocity
-    if drive is not None and number > 1:
-        before, behind = (np.interp(one, time, drive) for one in (start_time, end_time))
-        is_known = np.isfinite(measured[1:])
-        driven[1:] = np.where(is_known, before[1:] - behind[:-1], np.nan)
+            driven[slip] = np.interp(start_time[slip], time, drive) - drive[one]
+            risen[slip] = force_before[slip] - at_rest
     if not math.isfinite(stiffness) and np.isfinite(measured).any():
         stiffness = float(np.nanmedian(measured))
-    risen = np.full(number, np.nan)
-    risen[1:] = force_before[1:] - force_after[:-1]
     creep = driven - risen / stiffness
     return StickPhases(duration, rate, measured, creep * np.sign(driven), creep / driven)
 

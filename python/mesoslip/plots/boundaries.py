@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import matplotlib as mpl
@@ -20,43 +21,27 @@ Array = NDArray[np.float64]
 
 # The measure in whose pictures the boundaries are drawn.
 REGIME = "regime"
-# Number of points along a key between which lines are straight.
+# Minimum number of points along a key for smooth lines, and number of interpolated points.
+MIN_POINTS = 4
 FINE_POINTS = 200
-# Power of the excess over a boundary by which it is interpolated: growth rates on both sides of a
-# boundary may differ by decades. In five maps of runs/maps, zeros of the growth rate between
-# neighbours are wrong by 0.20 of their distance in the mean and 0.67 at most; by 0.28 and 0.94
-# without it.
-EXCESS_POWER = 0.25
 # Distance of the legend from axes, in sizes of its font.
 LINES_BELOW = 3.6
 
 
 class Boundary(NamedTuple):
-    """The line on which a measure, which may be positive, has a value."""
+    """The line on which a measure, which may be smooth or positive, has a value."""
 
     measure: str
     value: float
     style: Literal["-", "--", "-.", ":"]
     label: str
+    is_smooth: bool = True
     is_positive: bool = False
-
-    def excess(self, data: xr.Dataset, keys: list[SweptKey]) -> Array:
-        """The mean of the measure over realizations beyond the value, compressed, in the order of
-        the keys."""
-        dimensions = data[REGIME].isel(realization=0).dims
-        mean = data[self.measure].mean("realization").transpose(*dimensions).values
-        mean = mean[np.ix_(*(key.order for key in keys))]
-        if self.is_positive and not np.any(mean <= 0):
-            logarithm: Array = np.log(mean / self.value)
-            return logarithm
-        excess = mean - self.value
-        compressed: Array = np.sign(excess) * np.abs(excess) ** EXCESS_POWER
-        return compressed
 
 
 BOUNDARIES = (
     Boundary("growth_rate", 0.0, "-.", "steady sliding turns linearly unstable"),
-    Boundary("stable_out_of_step", 0.5, "-", "the same, contacts out of step"),
+    Boundary("stable_out_of_step", 0.5, "-", "the same, contacts out of step", is_smooth=False),
     Boundary("critical_stiffness_ratio", 1.0, "--", "$K = K^*$", is_positive=True),
     Boundary("waiting_over_damping", 1.0, ":", r"$\tau_{ss} \eta_S = 1$", is_positive=True),
 )
@@ -64,51 +49,66 @@ BOUNDARIES = (
 
 def draw_contours(axes: Axes, data: xr.Dataset, keys: list[SweptKey]) -> list[Line2D]:
     """Draw the boundaries that a map over two keys crosses; returns lines for a legend."""
+    dimensions = data[REGIME].dims[:2]
     drawn = []
     for one in BOUNDARIES:
         if one.measure not in data:
             continue
-        excess = one.excess(data, keys)
-        if min(excess.shape) > 1 and np.any(excess < 0) and np.any(excess > 0):
-            line = axes.contour(*_interpolated(keys, excess), [0], colors="black", linewidths=1.2)
+        values = data[one.measure].mean("realization").transpose(*dimensions).values
+        values = np.ma.masked_invalid(values[np.ix_(*(key.order for key in keys))].T)
+        if values.count() and values.min() < one.value < values.max():
+            x, y, values, level = _interpolated(one, keys, values)
+            line = axes.contour(x, y, values, [level], colors="black", linewidths=1.2)
             line.set_linestyle(one.style)
             drawn.append(one)
     return _handles(drawn)
 
 
-def _interpolated(keys: list[SweptKey], excess: Array) -> tuple[Array, Array, Any]:
-    """Axes and values of an excess between the points of a sweep, masked beside unknown values.
+def _interpolated(
+    boundary: Boundary, keys: list[SweptKey], values: Any
+) -> tuple[Array, Array, Any, float]:
+    """Axes, values of a measure and level, interpolated between the points of a sweep.
 
-    The interpolation is cubic and monotone along the first key and then the second, over the axes
-    as they are drawn: it changes its sign only between neighbours of different signs.
+    Cubic splines interpolate smooth measures that are known everywhere, positive ones by their
+    logarithm, over the axes as they are drawn. Other measures are not interpolated.
     """
-    from scipy.interpolate import PchipInterpolator
+    from scipy.interpolate import RectBivariateSpline
 
-    known = np.isfinite(excess)
-    between = np.stack([np.where(known, excess, 0.0), known])
-    fine = []
-    for axis, key in enumerate(keys, 1):
-        places = np.linspace(key.places[0], key.places[-1], FINE_POINTS)
-        between = PchipInterpolator(key.places, between, axis=axis)(places)
-        fine.append(key.values_at(places))
-    values, is_known = np.swapaxes(between, 1, 2)
-    return fine[0], fine[1], np.ma.masked_where(is_known < 1 - 1e-9, values)
+    axes = [key.values[key.order] for key in keys]
+    level = boundary.value
+    if (
+        not boundary.is_smooth
+        or not np.isfinite(np.ma.filled(values, np.nan)).all()
+        or min(values.shape) < MIN_POINTS
+    ):
+        return axes[0], axes[1], values, level
+    if boundary.is_positive and values.min() > 0:
+        values, level = np.log(values), math.log(level)
+    places = [
+        np.log(one) if key.is_logarithmic else one for one, key in zip(axes, keys, strict=True)
+    ]
+    fine = [np.linspace(one[0], one[-1], FINE_POINTS) for one in places]
+    spline = RectBivariateSpline(places[1], places[0], np.asarray(values))
+    between = spline(fine[1], fine[0])
+    x, y = (np.exp(one) if key.is_logarithmic else one for one, key in zip(fine, keys, strict=True))
+    return x, y, between, level
 
 
 def draw_crossings(axes: Axes, data: xr.Dataset, key: SweptKey) -> list[Line2D]:
     """Draw the boundaries along one key, interpolated linearly; returns lines for a legend."""
+    values = key.values[key.order]
+    x = np.log(values) if key.is_logarithmic else values
     drawn = []
     for one in BOUNDARIES:
         if one.measure not in data:
             continue
-        excess = one.excess(data, [key])
+        excess = data[one.measure].mean("realization").values[key.order] - one.value
         changes = np.flatnonzero(excess[1:] * excess[:-1] < 0)
         for left in changes:
             part = excess[left] / (excess[left] - excess[left + 1])
-            crossing = key.places[left] + part * np.diff(key.places)[left]
-            axes.axvline(
-                float(key.values_at(crossing)), color="black", linestyle=one.style, linewidth=1.2
-            )
+            crossing = x[left] + part * (x[left + 1] - x[left])
+            crossing = math.exp(crossing) if key.is_logarithmic else crossing
+            axes.axvline(crossing, color="black", linestyle=one.style, linewidth=1.2)
         if changes.size:
             drawn.append(one)
     return _handles(drawn)

@@ -538,6 +538,13 @@ def test_a_base_need_not_name_the_default_kind(tmp_path):
     assert (slider.mass, slider.stiffness) == (3e-3, 97)
 
 
+def test_a_long_chain_of_bases_is_refused(tmp_path):
+    for number in range(600):
+        (tmp_path / f"{number}.toml").write_text(f'base = "{number + 1}.toml"')
+    with pytest.raises(ConfigError, match="more than 50 files"):
+        Config.load(tmp_path / "0.toml")
+
+
 def test_files_that_cannot_be_read(tmp_path):
     with pytest.raises(FileError, match="no such file"):
         Config.load(tmp_path / "none.toml")

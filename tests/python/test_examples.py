@@ -21,7 +21,7 @@ def tracked(folder):
 
 def is_example(path):
     """Whether a file is a run that the program brings: not one of the source's."""
-    is_data = path.startswith("runs/measured/")
+    is_data = path.startswith("runs/measured/") or path == "runs/fit/experiment.csv"
     return is_data or (path.endswith(".toml") and not path.startswith("runs/source/"))
 
 

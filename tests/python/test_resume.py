@@ -458,7 +458,7 @@ def test_simulations_leave_no_memory_behind():
 LONG = {"output__interval": 1e-2, "output__slip_interval": 1e-3}
 LONG_RUNS = {
     "contacts": LONG | {"run__duration": 120.0, "run__realizations": 2, "contacts__count": 1000},
-    "fewer contacts": LONG | {"run__duration": 120.0, "contacts__count": 500},
+    "fewer contacts": LONG | {"run__duration": 400.0, "contacts__count": 500},
     "thermal populations": LONG
     | THERMAL
     | RANDOM

@@ -69,8 +69,8 @@ def number(
     return check
 
 
-def whole(low: int) -> Callable[[Any], int]:
-    """A whole number of at least a bound that fits into 32 bits."""
+def whole(low: int, *, bits: int = 31) -> Callable[[Any], int]:
+    """A whole number of at least a bound, below a power of two."""
 
     def check(value: Any) -> int:
         try:
@@ -79,8 +79,8 @@ def whole(low: int) -> Callable[[Any], int]:
             found = operator.index(value)
         except TypeError:
             found = low - 1
-        if not low <= found < 2**31:
-            raise ValueError(f"must be a whole number of at least {low}, below 2^31")
+        if not low <= found < 2**bits:
+            raise ValueError(f"must be a whole number of at least {low}, below 2^{bits}")
         return found
 
     return check

@@ -26,6 +26,9 @@ EXCLUSIVE = {
 # Keys that name a file, relative to the folder of the configuration.
 FILES = (("drive", "history", "file"), ("contacts", "threshold", "file"))
 
+# Files of a chain of bases.
+MAX_BASES = 50
+
 # Value of a change that removes a key.
 NONE = "none"
 
@@ -76,6 +79,9 @@ def _on_base(tables: dict[str, Any], source: str, folder: Path, outer: tuple[Pat
     path = folder / base
     if any(_are_the_same(path, one) for one in outer):
         raise ConfigError([Problem(source, "base", "files are based on each other", base)])
+    if len(outer) > MAX_BASES:
+        problem = f"more than {MAX_BASES} files are based on one another"
+        raise ConfigError([Problem(source, "base", problem, base)])
     _check_base(path, source, base)
     return _merge_over(_read(path, outer), tables)
 

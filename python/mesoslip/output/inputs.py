@@ -134,11 +134,11 @@ def _tree(output: object) -> xr.DataTree:
     """An output in memory as a tree."""
     import xarray as xr
 
-    from mesoslip.output.validity import check_output
+    from mesoslip.output.validity import check_rows
 
     # The dataset of a sweep has no groups.
     tree = xr.DataTree(output) if isinstance(output, xr.Dataset) else output
     if not isinstance(tree, xr.DataTree):
         raise FileError(f"{shown(output)}: is not an output; give its path or its DataTree")
-    check_output(tree, "the output")
+    check_rows(tree, "the output")
     return tree

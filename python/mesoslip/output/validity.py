@@ -62,7 +62,7 @@ def _is_table(path: Path) -> bool:
 
 def check_output(tree: Tree, name: str | Path) -> None:
     """Refuse an output that lacks variables that commands use, or has them with other dimensions;
-    and one with rows of unknown realizations or times that go back."""
+    and one whose rows cannot be right."""
     wrong = [
         f"attribute {one}"
         for one in ("configuration", "title", "comment", "complete")
@@ -73,7 +73,15 @@ def check_output(tree: Tree, name: str | Path) -> None:
     newer = _newer_version(tree.attrs.get("program_version"))
     if wrong and newer:
         raise FileError(f"{name}: is of {newer}, and cannot be read: {wrong[0]} is different")
-    wrong = [f"{one} is missing or wrong" for one in wrong] or _wrong_rows(tree)
+    if wrong:
+        raise FileError(f"{name}: a damaged output: {wrong[0]} is missing or wrong")
+    check_rows(tree, name)
+
+
+def check_rows(tree: Tree, name: str | Path) -> None:
+    """Refuse an output, or a part of one, with rows of realizations that it does not have, or with
+    times that go back."""
+    wrong = _wrong_rows(tree)
     if wrong:
         raise FileError(f"{name}: a damaged output: {wrong[0]}")
 
@@ -139,7 +147,7 @@ def _wrong_rows(tree: Tree) -> list[str]:
             + "; expected times in order"
             for row in np.flatnonzero(is_wrong)[:1]
         ]
-        if end:
+        if end in data:
             wrong += [
                 f"{group}/{end} is {data[end].values[row]:.9g} s in row {row}, which starts at "
                 f"{times[row]:.9g} s"

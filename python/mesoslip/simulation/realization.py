@@ -202,7 +202,7 @@ class Realization(Recorded):
         self._kernel = kernel
         return kernel
 
-    @arguments.checked(advances=arguments.whole(1), work=arguments.number(0, is_open=True))
+    @arguments.checked(advances=arguments.whole(1, bits=63), work=arguments.number(0, is_open=True))
     def advance(self, advances: int | None = None, *, work: float | None = None) -> None:
         """Advance by one segment: a number of advances, an amount of work, or about 0.25 s.
 

@@ -170,6 +170,7 @@ def test_outputs_in_memory_are_checked_as_files_are(output):
     tree = mesoslip.open_output(output)
     parts = {
         "realization_index is 0 in row": tree.isel(realization=slice(0)),
+        "dimension realization, of rows in slips, is missing": tree.isel(realization=0),
         "time is": tree.isel(time=slice(None, None, -1)),
     }
     for message, part in parts.items():

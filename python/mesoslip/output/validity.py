@@ -128,6 +128,9 @@ def _wrong_rows(tree: Tree) -> list[str]:
         times = data[name].values
         is_new = np.zeros(np.diff(times).shape, dtype=bool)
         if group:
+            if "realization" not in tree.sizes:
+                wrong.append(f"dimension realization, of rows in {group}, is missing")
+                break
             owners = data["realization_index"].values
             is_new = np.diff(owners) > 0
             is_wrong = ~((owners >= 0) & (owners < count))

@@ -114,12 +114,49 @@ def test_inputs_and_devices_are_not_overwritten(arguments, short, tmp_path, comm
     assert Path("/dev/null").is_char_device()
 
 
-def test_links_are_followed(short, tmp_path, command):
-    (tmp_path / "store").mkdir()
-    (tmp_path / "out.nc").symlink_to(tmp_path / "store" / "real.nc")
-    assert command("run", short, "-o", tmp_path / "out.nc")[0] == 0
-    assert (tmp_path / "out.nc").is_symlink()
-    assert mesoslip.open_output(tmp_path / "store" / "real.nc")["time"].size
+def test_links_of_outputs_are_followed(short, tmp_path, command):
+    """Also to an earlier output, which is replaced; to no other file, not even to a new one that
+    another program may execute."""
+    link, real = tmp_path / "out.nc", tmp_path / "store" / "real.nc"
+    real.parent.mkdir()
+    link.symlink_to(real)
+    for seed in (1, 2):
+        assert command("run", short, "-o", link, "--set", f"run.seed={seed}")[0] == 0
+        assert link.is_symlink()
+        assert mesoslip.open_output(real).attrs["seed"] == seed
+
+
+@pytest.mark.parametrize(
+    ("arguments", "name", "target"),
+    [
+        (("run", "short.toml", "-o"), "l.nc", "precious"),
+        (("run", "short.toml", "-o"), "l", "precious"),
+        (("run", "short.toml", "-o"), "precious.nc", ""),
+        (("curve", "short.toml", "-o"), "l.nc", "precious.nc"),
+        (("slips", "in.nc", "--csv"), "l.csv", "precious.csv"),
+        (("slips", "in.nc", "--table"), "l.tex", "precious.tex"),
+        (("plot", "in.nc", "-o"), "l.png", "precious.png"),
+        (("report", "in.nc", "-o"), "l.html", "precious.html"),
+        (("report", "in.nc", "-o"), "l.html", ".profile"),
+        (("run", "short.toml", "-o"), "l.nc", ".profile"),
+        (("run", "short.toml", "-o"), "l", ".profile"),
+    ],
+)
+@pytest.mark.usefixtures("short")
+def test_files_of_others_are_not_replaced(arguments, name, target, tmp_path, command, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("in.nc").write_bytes(OLD.read_bytes())
+    if target:
+        Path(name).symlink_to(target)
+    is_there = target != ".profile"
+    if is_there:
+        Path(name).write_text("precious")
+    status, _, printed = command(*arguments, name)
+    assert status == 2
+    assert printed.count("\n") == 1
+    assert ("is a link to" if target else "is not an output of mesoslip") in printed
+    assert (Path(name).read_text() if is_there else "precious") == "precious"
+    assert Path(target or name).exists() == is_there
 
 
 def test_a_full_disk_keeps_the_table_that_was_there(tmp_path, monkeypatch):

@@ -8,6 +8,7 @@ import os
 import re
 import subprocess
 import sys
+import tomllib
 from datetime import date
 
 import mesoslip
@@ -1120,3 +1121,19 @@ def test_the_expected_duration_of_a_run_that_avalanches_end(stiffness):
     assert tree.attrs["ending"] == "number of avalanches reached"
     duration = float(tree["stages/stage_end_time"].values[-1])
     assert 0.5 < config.expected_duration / duration < 2
+
+
+def test_many_mistakes_are_counted(tmp_path, monkeypatch):
+    """Of thousands the first are described, and the file is parsed once."""
+    parsed = []
+    loads = tomllib.loads
+    monkeypatch.setattr(tomllib, "loads", lambda text: parsed.append(text) or loads(text))
+    path = tmp_path / "many.toml"
+    path.write_text("".join(f"[t{number}]\n" for number in range(2000)))
+    with pytest.raises(ConfigError) as raised:
+        Config.load(path)
+    *described, last = raised.value.problems
+    assert len(described) == 50
+    # Four tables are missing.
+    assert last.message == f"{2004 - 50} more errors"
+    assert len(parsed) == 1

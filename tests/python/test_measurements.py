@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import gzip
+import tracemalloc
+import zipfile
 
 import h5py
 import measurements
@@ -36,18 +38,65 @@ def test_files_in_many_styles_are_read_as_they_were_made(tmp_path, number):
     assert measurements.check_whole(case, measurements.write(case, tmp_path)) == []
 
 
+UNITS = {"time": "s", "force": "uN"}
+
+
 def test_data_sets_take_bounded_memory(tmp_path, monkeypatch):
     path = tmp_path / "run.h5"
     with h5py.File(path, "w") as file:
         file["time"], file["force"] = np.arange(50.0), np.sin(np.arange(50.0))
-        for name in ("time", "force"):
-            file[name].attrs["units"] = {"time": "s", "force": "uN"}[name]
+        for name, unit in UNITS.items():
+            file[name].attrs["units"] = unit
         for number in range(12):
             file.create_dataset(f"empty{number}", (230_000_000,), float, chunks=(10_000,))
+        # Not a column.
+        video = file.create_dataset("video", (200, 300, 500_000), "f4", chunks=(1, 1, 10))
+        video[0, 0, 0] = 1
     assert mesoslip.read_trace(path).sizes["time"] == 50
     monkeypatch.setattr("mesoslip.measured.reading.binary.MAX_BYTES", 500)
     with pytest.raises(mesoslip.FileError, match="take more than"):
         mesoslip.read_trace(path)
+
+
+def zipped(path, arrays):
+    """An archive of headers of NumPy alone, which state shapes of any size."""
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, shape in arrays.items():
+            with archive.open(f"{name}.npy", "w") as file:
+                header = {"descr": "<f8", "fortran_order": False, "shape": shape}
+                np.lib.format.write_array_header_1_0(file, header)
+
+
+def packed(path, arrays):
+    """A file of MATLAB with zeros, compressed to a thousandth."""
+    savemat(path, {name: np.zeros(shape) for name, shape in arrays.items()}, do_compression=True)
+
+
+@pytest.mark.parametrize(("make", "ending"), [(zipped, "npz"), (packed, "mat")])
+def test_what_unpacks_to_more_than_memory_is_refused(make, ending, tmp_path, monkeypatch):
+    """Before anything is unpacked: a small archive may state any size."""
+    path = tmp_path / f"run.{ending}"
+    make(path, {"time_s": (500_000,), "force_uN": (500_000,)})
+    monkeypatch.setattr("mesoslip.measured.reading.binary.MAX_BYTES", 6_000_000)
+    tracemalloc.start()
+    try:
+        with pytest.raises(mesoslip.FileError, match="take more than"):
+            mesoslip.read_trace(path)
+        assert tracemalloc.get_traced_memory()[1] < 4_000_000
+    finally:
+        tracemalloc.stop()
+
+
+def test_arrays_that_are_not_columns_are_not_read(tmp_path):
+    path = tmp_path / "run.npz"
+    time = np.arange(50.0)
+    np.savez(path, time_s=time, force_uN=np.sin(time), table=np.zeros((50, 3)))
+    with zipfile.ZipFile(path, "a") as archive, archive.open("more.npy", "w") as file:
+        header = {"descr": "<f8", "fortran_order": False, "shape": (10**12,)}
+        np.lib.format.write_array_header_1_0(file, header)
+    read = mesoslip.read_trace(path)
+    np.testing.assert_allclose(read["spring_force"][0], 1e-6 * np.sin(time))
+    assert len(read["recorded"].data_vars) == 5
 
 
 @pytest.mark.parametrize("number", range(200))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
 import platform
 import resource
@@ -377,23 +378,51 @@ def test_extremes_of_stages_in_earlier_files_have_the_names_of_today(klein, tmp_
 
 
 def test_what_a_killed_process_left_behind_is_removed(tmp_path):
-    """The part of an output that nobody writes any more, and no other file."""
-    path = tmp_path / "out.nc"
+    """The folder in which nobody writes any more, and no other one."""
     dead = subprocess.Popen([sys.executable, "-c", ""])
     dead.wait()
-    node = platform.node()
-    left = tmp_path / f".{node}-{dead.pid}-1.out.nc"
+    start, end = f".mesoslip-{platform.node()}-", f"-{'0' * 16}"
+    left = tmp_path / f"{start}{dead.pid}{end}"
+    locked = tmp_path / f"{start}{dead.pid}-{'1' * 16}"
     others = [
-        tmp_path / f".{node}-{os.getpid()}-1.out.nc",
-        tmp_path / f".elsewhere-{dead.pid}-1.out.nc",
-        tmp_path / f".{node}-{dead.pid}-1.other.nc",
+        locked,
+        tmp_path / f"{start}{os.getpid()}{end}",
+        tmp_path / f".mesoslip-elsewhere-{dead.pid}{end}",
+        tmp_path / f"{start}{dead.pid}-mine",
         # A number that no process can have.
-        tmp_path / f".{node}-{10**30}-1.out.nc",
+        tmp_path / f"{start}{10**30}{end}",
     ]
     for one in (left, *others):
-        one.touch()
-    targets.check_writable(path)
-    assert sorted(tmp_path.iterdir()) == sorted(others)
+        (one / "out.zarr").mkdir(parents=True)
+        (one / "out.zarr" / "part").touch()
+    link = tmp_path / f"{start}{dead.pid}-{'2' * 16}"
+    link.symlink_to(others[1])
+    # Of a process that is not seen from this container.
+    number = os.open(locked, os.O_RDONLY)
+    fcntl.flock(number, fcntl.LOCK_EX)
+    try:
+        targets.check_writable(tmp_path / "out.nc")
+    finally:
+        os.close(number)
+    assert sorted(tmp_path.iterdir()) == sorted([link, *others])
+    assert all((one / "out.zarr" / "part").exists() for one in others)
+
+
+def test_nobody_leads_a_file_that_is_written_elsewhere(tmp_path):
+    """A neighbour who may write to the folder renames what is in it, and puts links there."""
+    theirs = tmp_path / "theirs"
+    theirs.mkdir()
+    (theirs / "out.csv").write_text("precious")
+    with targets.written_whole(tmp_path / "out.csv") as part:
+        (private,) = tmp_path.glob(".mesoslip-*")
+        assert private.stat().st_mode & 0o077 == 0
+        private.rename(tmp_path / "moved")
+        private.symlink_to(theirs)
+        part.write_text("new")
+        (tmp_path / "out.csv").symlink_to(theirs / "out.csv")
+    assert (theirs / "out.csv").read_text() == "precious"
+    assert (tmp_path / "out.csv").read_text() == "new"
+    assert not (tmp_path / "out.csv").is_symlink()
 
 
 def test_samples_of_a_slip_come_with_the_slip():

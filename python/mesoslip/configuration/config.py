@@ -22,7 +22,6 @@ from mesoslip.configuration.drive import Drive, DrivePart
 from mesoslip.configuration.files import (
     Change,
     Merged,
-    base_of,
     check_no_files,
     on_base,
     override,
@@ -318,7 +317,7 @@ class Config(Table):
         """
         path, overrides = as_path(path), tuple(overrides)
         merged = read_toml(path)
-        base = base_of(path) or (merged.tables if overrides else None)
+        base = merged.base or (merged.tables if overrides else None)
         return cls._checked(override(merged, overrides), str(path), base)
 
     @classmethod

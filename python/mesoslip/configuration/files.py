@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -37,21 +37,17 @@ Change = str | Mapping[str, Any]
 
 @dataclass
 class Merged:
-    """Merged tables, and dotted keys that the new kind of slider does not have."""
+    """Merged tables, dotted keys that the new kind of slider does not have, and the tables of the
+    base of a file, if it has one."""
 
     tables: dict[str, Any]
     dropped: list[str] = field(default_factory=list)
+    base: dict[str, Any] | None = None
 
 
 def read_toml(path: Path) -> Merged:
     """Tables of a file, merged with those of its base."""
     return _read(path, ())
-
-
-def base_of(path: Path) -> dict[str, Any] | None:
-    """Tables of the base of a file, if it has one."""
-    base = parse_toml(text_of(path, "a configuration file"), str(path)).get("base")
-    return None if base is None else _read(path.parent / base, (path,)).tables
 
 
 def on_base(tables: Mapping[str, Any], source: str, folder: Path) -> Merged:
@@ -83,7 +79,8 @@ def _on_base(tables: dict[str, Any], source: str, folder: Path, outer: tuple[Pat
         problem = f"more than {MAX_BASES} files are based on one another"
         raise ConfigError([Problem(source, "base", problem, base)])
     _check_base(path, source, base)
-    return _merge_over(_read(path, outer), tables)
+    below = _read(path, outer)
+    return replace(_merge_over(below, tables), base=below.tables)
 
 
 def _check_base(path: Path, source: str, base: str) -> None:

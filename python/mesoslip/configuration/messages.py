@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable, Iterator
+from functools import cache
 from typing import Any, get_args
 
 from pydantic import ValidationError
@@ -13,15 +14,20 @@ from mesoslip.configuration.sliders import SLIDERS
 from mesoslip.configuration.table import Table
 from mesoslip.errors import Problem
 
+# Maximum number of errors of a configuration that are described.
+MAX_PROBLEMS = 50
+
 
 def problems(error: ValidationError, source: str, whole: type[Table]) -> list[Problem]:
     """The errors that pydantic found in a configuration, whose outermost table is ``whole``."""
     found = []
-    for details in error.errors():
+    for details in error.errors(include_url=False)[:MAX_PROBLEMS]:
         if details["type"] == "tables":
             found += [Problem(source, *one) for one in details["ctx"]["complaints"]]
         else:
             found.append(_problem(details, source, whole))
+    if error.error_count() > MAX_PROBLEMS:
+        found.append(Problem(source, "", f"{error.error_count() - MAX_PROBLEMS} more errors"))
     return found
 
 
@@ -74,7 +80,7 @@ def _unknown_key(path: list[Any], slider: str, whole: type[Table]) -> str:
     keys = _table_at(path[:-1], slider, whole).model_fields.keys()
     near = difflib.get_close_matches(name, [*keys, *([] if table else ["base"])], 1)
     # The same name in another table is more likely than a similar name.
-    elsewhere = sorted({key for key in all_keys(whole) if key.rpartition(".")[2] == name})
+    elsewhere = sorted({key for key in _all_keys(whole) if key.rpartition(".")[2] == name})
     meant = " or ".join(repr(key) for key in elsewhere or near)
     return f"unknown key; did you mean {meant}?" if meant else "unknown key"
 
@@ -87,6 +93,11 @@ def _table_at(path: list[Any], slider: str, whole: type[Table]) -> type[Table]:
             inner = tables_in(table.model_fields[name].annotation)
             table = SLIDERS[slider] if name == "slider" else next(inner)
     return table
+
+
+@cache
+def _all_keys(table: type[Table]) -> tuple[str, ...]:
+    return tuple(all_keys(table))
 
 
 def all_keys(table: type[Table], outer: str = "") -> Iterator[str]:

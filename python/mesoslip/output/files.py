@@ -162,6 +162,11 @@ def check_run(tree: Tree, path: str | Path) -> None:
         raise FileError(f"{path}: not an output of mesoslip run{but}")
 
 
+def is_output(path: Path) -> bool:
+    """Whether there is an output of any command at a path."""
+    return _attribute(path, "configuration") is not None
+
+
 def is_of_another(path: Path, config: Config) -> bool:
     """Whether there is an output of another configuration at a path."""
     found = _attribute(path, "configuration")

@@ -32,7 +32,7 @@ def write(tree: xr.DataTree, path: Path) -> None:
     """Write a tree as an output; its name appears only when it is whole."""
     encoding = {group.path: _encoding(group.to_dataset(inherit=False)) for group in tree.subtree}
     # xarray would import Dask to look for locks of its scheduler.
-    with written_whole(path) as part, LOCK, array_packages.hidden():
+    with written_whole(path, is_output=True) as part, LOCK, array_packages.hidden():
         tree.to_netcdf(part, engine="netcdf4", encoding=encoding)
 
 
@@ -55,7 +55,7 @@ def write_results(results: Results, path: Path, *, threads: int = 1) -> None:
     The file equals that of `write` for the tree of `mesoslip.output.tree.build_tree`.
     """
     groups = layout.describe(results)
-    with written_whole(path) as part, LOCK:
+    with written_whole(path, is_output=True) as part, LOCK:
         with netCDF4.Dataset(part, "w", format="NETCDF4") as file:
             for name, form in groups.items():
                 place = file.createGroup(name) if name else file

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import shutil
-from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
-from uuid import uuid4
 
 from mesoslip.errors import FileError
+from mesoslip.output.targets import private_folder
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -31,22 +29,19 @@ def write_zarr(tree: xr.DataTree, path: Path) -> None:
             f"{path}: Zarr needs a package that is not installed: python -m pip install "
             "'mesoslip[zarr]', or python -m pip install zarr"
         ) from None
-    if path.exists() and not (path / MARK).is_file():
+    if path.is_symlink() or (path.exists() and not (path / MARK).is_file()):
         raise FileError(f"{path}: cannot be written: exists, and is not a Zarr store")
     plain = tree.copy()
     for group in plain.subtree:
         for name in group.variables:
             # Compression is Zarr's own.
             group[str(name)].encoding = {}
-    part = path.with_name(f".{uuid4().hex}.{path.name}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        plain.to_zarr(part, zarr_format=FORMAT, consolidated=True)
-        if path.exists():
-            shutil.rmtree(path)
-        part.replace(path)
+        with private_folder(path.parent) as folder:
+            plain.to_zarr(folder.path / path.name, zarr_format=FORMAT, consolidated=True)
+            if path.exists():
+                folder.set_aside(path.name)
+            folder.release(path.name)
     except OSError as error:
         raise FileError(f"{path}: cannot be written: {error.strerror or error}") from error
-    finally:
-        with suppress(OSError):
-            shutil.rmtree(part)

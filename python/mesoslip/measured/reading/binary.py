@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import zipfile
+import zlib
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager
+from functools import partial
 from io import BytesIO
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import IO, Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -21,57 +25,80 @@ HDF5 = b"\x89HDF\r\n\x1a\n"
 MAX_ARRAYS = 10_000
 MAX_DEPTH = 20
 MAX_COLUMNS = 200
+# The element of a file of MATLAB that is compressed, and bytes of it that are unpacked at a time.
+COMPRESSED = 15
+UNPACKED_BYTES = 2**20
 
 
 class Found(NamedTuple):
-    """An array of a file: its name with those of its groups, its unit, and a longer name."""
+    """An array of a file, which is read when it is loaded: its name with those of its groups, its
+    unit, and a longer name."""
 
     name: str
-    values: Any
+    shape: tuple[int, ...]
+    dtype: np.dtype[Any]
+    load: Callable[[], Any]
     unit: str = ""
     long_name: str = ""
 
+    @property
+    def axes(self) -> tuple[int, ...]:
+        """Lengths of its axes but those of length 1."""
+        return tuple(size for size in self.shape if size != 1)
 
-def _read(kind: str, path: Path, data: bytes, arrays: Callable[[bytes], Iterator[Found]]) -> Table:
+    @property
+    def columns(self) -> int:
+        """Number of columns of numbers; 0 if it is no table."""
+        is_table = self.dtype.kind in "fiub" and len(self.axes) in {1, 2}
+        columns = min(self.axes) if len(self.axes) == 2 else 1
+        return columns if is_table and columns <= MAX_COLUMNS else 0
+
+    @property
+    def rows(self) -> int:
+        return max(self.axes)
+
+    def values(self) -> Any:
+        """Its columns, shape (columns, rows)."""
+        values = np.asarray(self.load()).reshape(self.axes)
+        if values.ndim == 2 and values.shape[0] >= values.shape[1]:
+            values = values.T
+        return values.reshape(self.columns, self.rows)
+
+
+# Opens the content of a file, whose arrays can be loaded until it is closed.
+Reader = Callable[[bytes], AbstractContextManager[Sequence[Found]]]
+
+
+def _read(kind: str, path: Path, data: bytes, arrays: Reader) -> Table:
     """Read the arrays of a file as columns of a table."""
     try:
-        with LOCK:
-            found = list(arrays(data))
+        with LOCK, arrays(data) as found:
+            return _table(kind, path, found)
     except FileError as error:
         raise FileError(f"{path}: {error}") from None
     # Libraries raise errors of any type for a damaged file.
     except Exception as error:
         raise FileError(f"{path}: a damaged file of {kind}: {error}") from None
-    return _table(kind, path, found)
 
 
-def _table(kind: str, path: Path, found: list[Found]) -> Table:
-    """Arrays of the usual length as the columns of a table."""
+def _table(kind: str, path: Path, found: Sequence[Found]) -> Table:
+    """Arrays of the usual length as the columns of a table; only these are loaded."""
+    others = [f"{one.name} ({_described(one)})" for one in found if not one.columns]
+    tables = [one for one in found if one.columns]
+    counts: Counter[int] = Counter()
+    for one in tables:
+        counts[one.rows] += one.columns
+    if not counts:
+        raise FileError(f"has no columns of numbers ({kind})")
+    length = max(counts, key=lambda size: (counts[size], size))
+    others += [f"{one.name} ({one.rows} numbers)" for one in tables if one.rows != length]
+    tables = [one for one in tables if one.rows == length]
+    _check_bytes(counts[length] * length * np.dtype(float).itemsize, "its columns")
+    values = np.empty((counts[length], length))
     columns: list[Found] = []
-    others: list[str] = []
-    for one in found:
-        values = np.asarray(one.values)
-        shape = tuple(size for size in values.shape if size != 1)
-        if values.dtype.kind not in "fiub" or len(shape) not in {1, 2}:
-            others.append(f"{one.name} ({_described(values)})")
-        elif len(shape) == 1:
-            columns.append(one._replace(values=values.reshape(-1)))
-        else:
-            table = values.reshape(shape)
-            table = table if shape[0] >= shape[1] else table.T
-            if table.shape[1] > MAX_COLUMNS:
-                others.append(f"{one.name} ({_described(values)})")
-                continue
-            columns += [Found("", table[:, n], one.unit) for n in range(table.shape[1])]
-    lengths = Counter(len(one.values) for one in columns)
-    if not lengths:
-        raise FileError(f"{path}: has no columns of numbers ({kind})")
-    length = max(lengths, key=lambda size: (lengths[size], size))
-    others += [
-        f"{one.name} ({len(one.values)} numbers)" for one in columns if len(one.values) != length
-    ]
-    columns = [one for one in columns if len(one.values) == length]
-    values = np.array([np.asarray(one.values, dtype=float) for one in columns])
+    for one in tables:
+        values[len(columns) : len(columns) + one.columns] = one.values()
+        columns += [one if one.columns == 1 else one._replace(name="", long_name="")] * one.columns
     values[~np.isfinite(values)] = np.nan
     notes = [f"{kind}: {len(columns)} columns"]
     if others:
@@ -88,9 +115,18 @@ def _table(kind: str, path: Path, found: list[Found]) -> Table:
     )
 
 
-def _described(values: Any) -> str:
-    shape = " x ".join(str(size) for size in values.shape)
-    return f"{shape or 'one'} {values.dtype.name}"
+def _check_bytes(size: int, name: str) -> None:
+    """Refuse what would not fit into memory."""
+    if size > MAX_BYTES:
+        raise FileError(
+            f"{name} take more than {MAX_BYTES / 2**30:.3g} GiB; copy those of the measurement to "
+            "a file"
+        )
+
+
+def _described(one: Found) -> str:
+    shape = " x ".join(str(size) for size in one.shape)
+    return f"{shape or 'one'} {one.dtype.name}"
 
 
 def _headers(columns: list[Found]) -> tuple[str, ...]:
@@ -106,52 +142,106 @@ def _headers(columns: list[Found]) -> tuple[str, ...]:
     return tuple(headers)
 
 
-def _npz(data: bytes) -> Iterator[Found]:
-    with np.load(BytesIO(data), allow_pickle=False) as archive:
-        for name in archive.files:
-            values = archive[name]
-            if values.dtype.names:
-                yield from (Found(field, values[field]) for field in values.dtype.names)
-            else:
-                yield Found(name, values)
+def _fields(name: str, shape: Sequence[int], dtype: Any, load: Callable[..., Any]) -> list[Found]:
+    """An array, or its named fields, which are loaded by their names."""
+    if dtype.names is None:
+        return [Found(name, tuple(shape), dtype, load)]
+    before = f"{name}/" if name else ""
+    return [
+        Found(f"{before}{field}", tuple(shape), dtype[field], partial(load, field))
+        for field in dtype.names
+    ]
 
 
-def _npy(data: bytes) -> Iterator[Found]:
-    values = np.load(BytesIO(data), allow_pickle=False)
-    if values.dtype.names:
-        yield from (Found(field, values[field]) for field in values.dtype.names)
-    else:
-        yield Found("data", values)
+@contextmanager
+def _npz(data: bytes) -> Iterator[list[Found]]:
+    found: list[Found] = []
+    with zipfile.ZipFile(BytesIO(data)) as archive:
+        for member in archive.namelist():
+            if member.endswith(".npy"):
+                with archive.open(member) as file:
+                    shape, dtype = _npy_header(file)
+                load = partial(_npy_array, partial(archive.open, member))
+                found += _fields(member.removesuffix(".npy"), shape, dtype, load)
+        yield found
 
 
-def _matlab(data: bytes) -> Iterator[Found]:
+@contextmanager
+def _npy(data: bytes) -> Iterator[list[Found]]:
+    shape, dtype = _npy_header(BytesIO(data))
+    yield _fields(
+        "" if dtype.names else "data", shape, dtype, partial(_npy_array, partial(BytesIO, data))
+    )
+
+
+def _npy_header(file: IO[bytes]) -> tuple[tuple[int, ...], np.dtype[Any]]:
+    """Shape and type of an array of NumPy."""
+    version = np.lib.format.read_magic(file)
+    read = np.lib.format.read_array_header_1_0
+    if version != (1, 0):
+        read = np.lib.format.read_array_header_2_0
+    shape, _, dtype = read(file)
+    if dtype.hasobject:
+        raise ValueError("it has objects")
+    return shape, dtype
+
+
+def _npy_array(open_file: Callable[[], IO[bytes]], field: str | None = None) -> Any:
+    with open_file() as file:
+        values = np.lib.format.read_array(file, allow_pickle=False)
+    return values if field is None else values[field]
+
+
+@contextmanager
+def _matlab(data: bytes) -> Iterator[list[Found]]:
     from scipy.io import loadmat
 
+    _check_unpacked(data)
     contents = loadmat(BytesIO(data), squeeze_me=True, struct_as_record=False)
-    for name, value in contents.items():
-        if not name.startswith("__"):
-            yield from _fields(name, value, 0)
+    yield [
+        one
+        for name, value in contents.items()
+        if not name.startswith("__")
+        for one in _structure(name, value, 0)
+    ]
 
 
-def _fields(name: str, value: Any, depth: int) -> Iterator[Found]:
+def _check_unpacked(data: bytes) -> None:
+    """Refuse a file of MATLAB whose variables are too large when they are unpacked."""
+    order: Literal["little", "big"] = "little" if data[126:128] == b"IM" else "big"
+    at, total = 128, 0
+    while at + 8 <= len(data):
+        kind, size = (int.from_bytes(data[n : n + 4], order) for n in (at, at + 4))
+        if kind == COMPRESSED:
+            packed, unpack = data[at + 8 : at + 8 + size], zlib.decompressobj()
+            while packed and total <= MAX_BYTES:
+                total += len(unpack.decompress(packed, UNPACKED_BYTES))
+                packed = unpack.unconsumed_tail
+        _check_bytes(total, "its variables")
+        at += 8 + size
+
+
+def _structure(name: str, value: Any, depth: int) -> Iterator[Found]:
     """The arrays of a structure of MATLAB."""
     names = getattr(value, "_fieldnames", None)
     if names is None:
-        yield Found(name, np.asarray(value))
+        values = np.asarray(value)
+        yield Found(name, values.shape, values.dtype, lambda: values)
     elif depth < MAX_DEPTH:
         for one in names:
-            yield from _fields(f"{name}/{one}", getattr(value, one), depth + 1)
+            yield from _structure(f"{name}/{one}", getattr(value, one), depth + 1)
 
 
-def _hdf5(data: bytes) -> Iterator[Found]:
+@contextmanager
+def _hdf5(data: bytes) -> Iterator[list[Found]]:
     """Data sets of groups, except links, and data in other files."""
     import h5py
 
     with h5py.File(BytesIO(data), "r") as file:
         if "program_version" in file.attrs and "configuration" in file.attrs:
             raise FileError("is an output of mesoslip, not a file of a measurement")
+        found: list[Found] = []
         seen: set[int] = set()
-        remaining = MAX_BYTES
         groups: list[tuple[str, Any]] = [("", file.id)]
         while groups:
             parent, group = groups.pop()
@@ -167,18 +257,11 @@ def _hdf5(data: bytes) -> Iterator[Found]:
                 if isinstance(target, h5py.h5g.GroupID):
                     groups.append((f"{name}/", target))
                 elif isinstance(target, h5py.h5d.DatasetID):
-                    one = h5py.Dataset(target)
-                    if target.get_storage_size() > 0:
-                        remaining -= one.size * max(one.dtype.itemsize, np.dtype(float).itemsize)
-                    if remaining < 0:
-                        raise FileError(
-                            f"its data sets up to {name} take more than "
-                            f"{MAX_BYTES / 2**30:.3g} GiB; copy those of the measurement to a file"
-                        )
-                    yield from _data_set(name, one)
+                    found += _data_set(name, h5py.Dataset(target))
+        yield found
 
 
-def _data_set(name: str, one: Any) -> Iterator[Found]:
+def _data_set(name: str, one: Any) -> list[Found]:
     import h5py
 
     creation = one.id.get_create_plist()
@@ -186,19 +269,39 @@ def _data_set(name: str, one: Any) -> Iterator[Found]:
         raise FileError(f"{name} has its data in another file")
     # A data set without data in the file may have any size.
     if one.shape is None or one.id.get_storage_size() == 0:
-        return
+        return []
     if one.dtype.names:
-        values = one[()]
-        yield from (Found(f"{name}/{field}", values[field]) for field in one.dtype.names)
-    elif one.dtype.kind in "fiub":
-        attributes = {key: one.attrs[key] for key in one.attrs}
-        # A dimension of netCDF without numbers of its own.
-        if b"not a netCDF variable" not in bytes(str(attributes.get("NAME", "")), "utf-8"):
-            yield _unpacked(name, one[()], attributes)
+        return _fields(name, one.shape, one.dtype, lambda field: one[field])
+    attributes = {key: one.attrs[key] for key in one.attrs}
+    # A dimension of netCDF without numbers of its own.
+    is_number = one.dtype.kind in "fiub"
+    if not is_number or b"not a netCDF variable" in bytes(str(attributes.get("NAME", "")), "utf-8"):
+        return []
+    return [_packed(name, one.shape, one.dtype, lambda: one[()], attributes)]
 
 
-def _unpacked(name: str, values: Any, attributes: Mapping[str, Any]) -> Found:
-    """Numbers unpacked and missing according to the attributes of CF."""
+def _packed(
+    name: str,
+    shape: tuple[int, ...],
+    dtype: np.dtype[Any],
+    load: Callable[[], Any],
+    attributes: Mapping[str, Any],
+) -> Found:
+    """An array that is packed, with missing numbers, according to the attributes of CF."""
+    unit = next(
+        (_text(attributes[key]) for key in ("units", "unit", "Units") if key in attributes), ""
+    )
+    return Found(
+        name,
+        shape,
+        dtype,
+        lambda: _unpacked(load(), attributes),
+        unit.partition(" since ")[0],
+        _text(attributes.get("long_name", "")),
+    )
+
+
+def _unpacked(values: Any, attributes: Mapping[str, Any]) -> Any:
     numbers = np.asarray(values, dtype=float)
     for key in ("_FillValue", "missing_value"):
         if key in attributes:
@@ -207,15 +310,7 @@ def _unpacked(name: str, values: Any, attributes: Mapping[str, Any]) -> Found:
         float(np.asarray(attributes.get(key, usual)).reshape(-1)[0])
         for key, usual in (("scale_factor", 1.0), ("add_offset", 0.0))
     )
-    unit = next(
-        (_text(attributes[key]) for key in ("units", "unit", "Units") if key in attributes), ""
-    )
-    return Found(
-        name,
-        numbers * scale + offset if (scale, offset) != (1.0, 0.0) else numbers,
-        unit.partition(" since ")[0],
-        _text(attributes.get("long_name", "")),
-    )
+    return numbers * scale + offset if (scale, offset) != (1.0, 0.0) else numbers
 
 
 def _text(value: Any) -> str:
@@ -224,18 +319,24 @@ def _text(value: Any) -> str:
     return value if isinstance(value, str) else ""
 
 
-def _netcdf3(data: bytes) -> Iterator[Found]:
+@contextmanager
+def _netcdf3(data: bytes) -> Iterator[list[Found]]:
     from scipy.io import netcdf_file
 
     with netcdf_file(BytesIO(data), "r", mmap=False) as file:
-        for name, variable in file.variables.items():
-            attributes = dict(variable._attributes)
-            yield _unpacked(name, np.array(variable.data), attributes)
+        yield [
+            _packed(
+                name,
+                one.data.shape,
+                one.data.dtype,
+                partial(np.array, one.data),
+                dict(one._attributes),
+            )
+            for name, one in file.variables.items()
+        ]
 
 
-def _reader(
-    kind: str, arrays: Callable[[bytes], Iterator[Found]]
-) -> Callable[[Path, bytes], Table]:
+def _reader(kind: str, arrays: Reader) -> Callable[[Path, bytes], Table]:
     return lambda path, data: _read(kind, path, data, arrays)
 
 

@@ -27,6 +27,8 @@ MIN_PLAIN = 1e-4
 ERROR_DIGITS = 2
 # Minimum error that is written, over its value.
 MIN_ERROR = 1e-12
+# Smallest probability that is written: noise and model are known no better.
+MIN_PROBABILITY = 1e-3
 # Maximum ratio of numbers in a column with the same decimals.
 MAX_RANGE = 1e3
 
@@ -196,6 +198,11 @@ def column(values: Iterable[float | None], unit: str, digits: int = 4) -> Column
     if largest > MAX_RANGE * min(shown) or not MIN_PLAIN <= largest < MAX_PLAIN:
         return Column(scale, None, digits)
     return Column(scale, max(0, digits - 1 - _power(largest)), digits)
+
+
+def probability(value: float) -> str:
+    """A probability with two digits, or a bound for one below 0.001."""
+    return f"< {MIN_PROBABILITY:g}" if value < MIN_PROBABILITY else number(value, 2)
 
 
 def percent(part: float) -> str:

@@ -17,6 +17,8 @@ LONG_TIMES = (
 )
 # Units whose first factor takes a prefix.
 PREFIXED = {"m", "s", "N", "Pa", "J", "m/s", "N/m", "N/s"}
+# Power of the smallest prefix of velocities: nobody reads attometres per second.
+MIN_VELOCITY_POWER = -12
 
 # Range of sizes of numbers without an exponent.
 MAX_PLAIN = 1e6
@@ -25,6 +27,8 @@ MIN_PLAIN = 1e-4
 ERROR_DIGITS = 2
 # Minimum error that is written, over its value.
 MIN_ERROR = 1e-12
+# Smallest probability that is written: noise and model are known no better.
+MIN_PROBABILITY = 1e-3
 # Maximum ratio of numbers in a column with the same decimals.
 MAX_RANGE = 1e3
 
@@ -61,17 +65,17 @@ def scale_for(max_size: float, unit: str) -> Scale:
         max_size = min(max_size, 999.0)
     if unit not in PREFIXED:
         return Scale(unit, 1.0)
-    letter, size = _prefix(max_size)
+    letter, size = _prefix(max_size, MIN_VELOCITY_POWER if unit == "m/s" else min(LETTERS))
     return Scale(letter + unit, size)
 
 
-def _prefix(size: float) -> tuple[str, float]:
+def _prefix(size: float, min_power: int = min(LETTERS)) -> tuple[str, float]:
     """The prefix for which a number is between 1 and 1000, if there is one, and its size."""
     if not 0 < size < math.inf:
         return "", 1.0
     # With a margin, so that a number just below 1000 is not printed as 1000.
     power = 3 * math.floor(math.log10(size * (1 + 1e-9)) / 3)
-    power = min(max(power, min(LETTERS)), max(LETTERS))
+    power = min(max(power, min_power), max(LETTERS))
     return LETTERS[power], 10.0**power
 
 
@@ -194,6 +198,11 @@ def column(values: Iterable[float | None], unit: str, digits: int = 4) -> Column
     if largest > MAX_RANGE * min(shown) or not MIN_PLAIN <= largest < MAX_PLAIN:
         return Column(scale, None, digits)
     return Column(scale, max(0, digits - 1 - _power(largest)), digits)
+
+
+def probability(value: float) -> str:
+    """A probability with two digits, or a bound for one below 0.001."""
+    return f"< {MIN_PROBABILITY:g}" if value < MIN_PROBABILITY else number(value, 2)
 
 
 def percent(part: float) -> str:

@@ -47,6 +47,10 @@ def test_creep_velocities_are_those_of_the_theory(creep, creeping):
         expected = contact_theory(creep).creep_velocity(row["force"])
         assert contact_theory(creep).creep_force(expected) == pytest.approx(row["force"])
         assert abs(row["velocity"] - expected) < 4 * row["velocity_error"] < 0.4 * expected
+    # Over each stage, with the elastic stretch at the jump of the force before its first sample.
+    time, moved = creeping["time"].values, creeping["displacement"].values[0]
+    ends = np.interp([0.0, 8.0, 16.0], time, moved)
+    assert [row["displacement"] for row in rows] == pytest.approx(np.diff(ends), rel=1e-3)
     slope = scalars_of(found, "creep")["creep_rate_dependence"]
     assert slope == pytest.approx(contact_theory(creep).steady_slope(rows[0]["velocity"]), rel=0.2)
     for name in ("steady", "steps", "holds", "ramps", "rate_and_state"):

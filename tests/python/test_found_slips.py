@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import mesoslip
 import numpy as np
 import pytest
@@ -218,12 +220,17 @@ def test_creep_begins_after_the_rebound(delay, damping_ratio):
     """The slider overshoots by as much as the drive loads; a weakly damped one never rests."""
     changes = {"contacts__delay": delay, "slider__damping_ratio": damping_ratio}
     changes |= {"contacts__count": 500, "drive__velocity": 1e-6, "run__duration": 1.0}
-    found = mesoslip.slips(mesoslip.run(klein_tables(**changes)))
+    tree = mesoslip.run(klein_tables(**changes))
+    found = mesoslip.slips(tree)
     share = found["creep_share"].values[1:]
     assert share.size >= 2
+    in_slips = mesoslip.response(tree, fit=False)["steady/slip_share"].item()
     if damping_ratio < 0.1:
         assert np.isnan(share).all()
+        assert math.isnan(in_slips)
     else:
+        # Drops with their rebounds add up to 1.5 of the loading; the rest is that of creep.
+        assert in_slips == pytest.approx(1 - np.median(share), abs=0.1)
         # Pinned contacts stretch by K/(K + Nk) of the drive; only some break before a slip.
         assert np.all(share > 0.8 * 97 / 2097)
         assert np.median(share) < 0.15

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -17,9 +18,11 @@ from mesoslip.analysis.rate_and_state import (
     fit_laws,
     fit_rows,
     points_of_trace,
+    preferred_law,
     records_of,
 )
 from mesoslip.analysis.rate_and_state.noise import estimated_noise
+from mesoslip.analysis.rate_and_state.rows import _row
 from mesoslip.analysis.response import response, rows_of, tables
 from mesoslip.measured.load_point import drive_stages
 from mesoslip.measured.output_groups import stage_group
@@ -114,6 +117,38 @@ def test_what_does_not_stand_out_gets_no_numbers():
         assert not row["is_described"]
 
 
+def test_numbers_beyond_the_friction_are_refused():
+    """A fit with b of twice the friction, whatever its error."""
+    (record,) = records_of(Experiment(trace()))
+    fits = fit_laws(record, ["slip"])
+    at = fits["slip"].at.copy()
+    at[fits["slip"].law.names.index("b")] = -2 * 0.6 / fits["slip"].law.scale
+    wrong = replace(fits["slip"], at=at, covariance=1e-6 * fits["slip"].covariance)
+    assert fits["slip"].is_determined
+    assert not wrong.is_determined
+    assert preferred_law({"slip": wrong}) == ""
+    row = _row(0, wrong, is_preferred=False)
+    assert math.isnan(row["b"])
+    assert row["note"] == "not determined: b exceeds the friction itself"
+
+
+def test_a_stage_of_one_interval_holds_no_step():
+    """A false stage in the load point: the record ends before it."""
+    experiment = Experiment(trace())
+    first, second = experiment.stages
+    experiment.stages = (
+        first,
+        replace(second, end=100.0),
+        replace(second, number=2, start=100.0, end=100.02, start_velocity=1e-2, end_velocity=1e-2),
+        replace(second, number=3, start=100.02),
+    )
+    inside = experiment.samples(experiment.stages[2])
+    assert inside.stop - inside.start == 1
+    (row,) = fit_rows(experiment, 0, laws=["slip"])
+    check(row)
+    assert row["note"].endswith("without stage 2 and later ones: it is too short for a step")
+
+
 def test_a_hold_and_steps_together_and_by_themselves():
     stages = [*STEP, Loading(40, 0, 0), Loading(40, 10 * UM, 10 * UM), Loading(60, UM, UM)]
     tree = trace(stages=stages, noise=1e-4)
@@ -198,6 +233,16 @@ def test_the_response_of_a_trace_of_coefficients(tmp_path, command, monkeypatch)
         status, out, _ = command("response", path, option)
         assert status == 0
         assert out.startswith(start)
+    # Differences of AIC from the best law, and bounds of small probabilities.
+    (table,) = (one for one in tables(found) if one.title == "Rate and state")
+    columns = dict(zip(table.head, zip(*table.rows, strict=True), strict=True))
+    differences = [float(one) for one in columns["ΔAIC"]]
+    assert min(differences) == 0 < max(differences)
+    found["rate_and_state"]["fit_p_value"][:] = 6.8e-31
+    found["rate_and_state"]["stiffness"][:] = math.inf
+    (table,) = (one for one in tables(found) if one.title == "Rate and state")
+    assert not any(one.startswith("stiffness") for one in table.head)
+    assert {row[table.head.index("p")] for row in table.rows} == {"< 0.001"}
 
 
 def test_what_has_no_step_says_so():

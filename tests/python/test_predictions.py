@@ -75,6 +75,45 @@ def test_a_map_of_the_regime_has_the_lines_of_theory():
     assert "steady sliding" in text.get_text()
 
 
+@pytest.mark.parametrize("unknown", [0, 7])
+def test_lines_pass_where_neighbours_differ_and_nowhere_else(unknown):
+    """Growth rates from -0.1 to 2600: splines through them would cross zero between neighbours of
+    one sign."""
+    rng = np.random.default_rng(3)
+    x, y = np.geomspace(1e-4, 1e-2, 12), np.linspace(1.0, 3.0, 9)
+    # Unstable beyond a bent line, and around one point far away from it.
+    unstable = x[:, None] > 1e-3 * y**0.7
+    unstable[2, 6] = True
+    size = 10 ** rng.uniform(-3, 3.4, unstable.shape)
+    growth = np.where(unstable, size, -np.minimum(size, 0.1))
+    growth.ravel()[rng.choice(growth.size, unknown, replace=False)] = np.nan
+    names = ("contacts.delay", "slider.stiffness", "realization")
+    flags = {"flag_values": np.arange(2, dtype=np.int8), "flag_meanings": "smooth stick_slip"}
+    variables = {
+        "status": (names, np.zeros((*growth.shape, 1), dtype=np.int8)),
+        "regime": (names, unstable[..., None].astype(np.int8), flags),
+        "growth_rate": (names, growth[..., None], {"units": "s-1"}),
+    }
+    # In another order than along the axes.
+    data = xr.Dataset(variables, {names[0]: x, names[1]: y}).isel({names[1]: slice(None, None, -1)})
+    figure = mesoslip.plot(xr.DataTree(data.assign_attrs(configuration="", sweep="")))
+    (line,) = (one for one in figure.axes[0].collections if isinstance(one, ContourSet))
+    # Vertices may lie on the edges of cells.
+    vertices = np.concatenate([(one[1:] + one[:-1]) / 2 for one in line.allsegs[0]])
+    column, row = np.searchsorted(x, vertices[:, 0]), np.searchsorted(y, vertices[:, 1])
+    column, row = column.clip(1, x.size - 1), row.clip(1, y.size - 1)
+    corners = np.stack([growth[column - i, row - j] for i in (0, 1) for j in (0, 1)])
+    assert np.isfinite(corners).all()
+    assert ((corners.min(axis=0) < 0) & (corners.max(axis=0) > 0)).all()
+    # Each pair of neighbours with both signs, in cells without unknown values, has a crossing.
+    crossed = set(zip(column.tolist(), row.tolist(), strict=True))
+    for i in range(1, x.size):
+        for j in range(1, y.size):
+            cell = growth[i - 1 : i + 1, j - 1 : j + 1]
+            differs = np.isfinite(cell).all() and cell.min() < 0 < cell.max()
+            assert ((i, j) in crossed) == differs
+
+
 def test_a_third_key_has_a_map_for_each_value():
     figure = mesoslip.plot(sweep_over_two_keys(third=[1e-7, 1e-6]), view="regime")
     titles = [axes.get_title(loc="left") for axes in figure.axes if axes.get_title(loc="left")]

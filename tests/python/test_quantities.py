@@ -28,6 +28,7 @@ from mesoslip.quantities import column, number, percent, scale_for, with_error, 
         (86400.0 * 30, "s", "30 d"),
         (0.25, "1", "0.25"),
         (1e-30, "m", "1e-12 am"),
+        (2.5e-18, "m/s", "2.5e-6 pm/s"),
     ],
 )
 def test_a_number_is_written_in_the_unit_that_suits_it(value, unit, text):

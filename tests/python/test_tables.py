@@ -89,6 +89,11 @@ def test_responses_and_avalanches(run, tmp_path, command):
 
 
 def test_signs_of_latex_are_written(tmp_path):
+    odd = PrintedTable("t", ("ΔAIC", "p"), (("inf", "< 0.001"), ("6.8e-31", "(2.0 ± 0.1)e7")))
+    lines = latex(odd).splitlines()
+    assert lines[2] == r"$\Delta$AIC & p \\"
+    assert lines[4] == r"$\infty$ & $<$ 0.001 \\"
+    assert lines[5] == r"6.8$\times 10^{-31}$ & (2.0 $\pm$ 0.1)$\times 10^{7}$ \\"
     table = PrintedTable("t", ("D_c (µm)", "a - b"), (("1.0 ± 0.2", "5 % & #"),))
     assert latex(table).splitlines()[2] == r"$D_c$ (\textmu{}m) & $a - b$ \\"
     assert latex(table).splitlines()[4] == r"1.0 $\pm$ 0.2 & 5 \% \& \# \\"

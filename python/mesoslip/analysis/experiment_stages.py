@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from mesoslip.analysis.apparatus import apparatus_of
 from mesoslip.analysis.steady_force import SteadyMean, steady_mean
+from mesoslip.analysis.stick_phases import stick_phases
 from mesoslip.configuration.drive import DrivePart
 from mesoslip.errors import FileError
 from mesoslip.output.access import group_of, is_measured
@@ -301,28 +302,58 @@ class Experiment:
         return self.steady_means.get(stage.number)
 
     def slip_share(self, stage: Stage) -> float:
-        """Share of slips in the slider's displacement in the steady part of a stage.
+        """Share of slips in the loading by the drive in the steady part of a stage.
 
-        The sum of the force drops over the loading by the drive, K v t; 1 for perfect stick-slip.
+        From the start of each slip to that of the next, the force falls by the slip without its
+        rebound, and the drive loads it by K v t: their ratio is 1 for perfect stick-slip. It is 0
+        without slips, and NaN if the slider does not rest between two of them.
         """
-        stiffness = self.stiffness
-        if not stage.is_steady or not math.isfinite(stiffness) or "slips" not in self.tree.children:
+        data, owners = self._slips_of(stage)
+        if not owners.size:
             return 0.0
-        mean = self.mean_of(stage)
-        first = self.samples(stage).start + (0 if mean is None else mean.start)
-        if first >= self.time.size:
-            return 0.0
-        start = float(self.time[first])
-        slips = group_of(self.tree, "slips")
-        times = slips["start_time"].values
-        inside = (times >= start) & (times < stage.end)
-        drops = float(np.abs(slips["force_drop"].values[inside]).sum())
-        loaded = stiffness * abs(stage.velocity) * (stage.end - start) * self.force.shape[0]
-        return drops / loaded if loaded > 0 else 0.0
+        fallen = loaded = 0.0
+        for owner in np.unique(owners):
+            start, end, before = (
+                data[name][owners == owner] for name in ("start_time", "end_time", "force_before")
+            )
+            phases = stick_phases(self.time, self.force[owner], start, end, before)
+            falls = stage.direction * (before[:-1] - phases.rest_force[1:])
+            rests = np.isfinite(falls)
+            fallen += float(falls[rests].sum())
+            loaded += self.stiffness * abs(stage.velocity) * float(np.diff(start)[rests].sum())
+        return fallen / loaded if loaded > 0 else math.nan
 
     def is_stick_slip(self, stage: Stage) -> bool:
-        """Whether the motion in a stage is stick-slip."""
-        return self.slip_share(stage) > STICK_SLIP_SHARE
+        """Whether the motion in a stage is stick-slip: slips relieve the spring of a tenth of its
+        loading at least, with their rebounds."""
+        data, owners = self._slips_of(stage)
+        if not owners.size:
+            return False
+        first = self._steady_start(stage)
+        loaded = self.stiffness * abs(stage.velocity) * (stage.end - first) * self.force.shape[0]
+        return float(np.abs(data["force_drop"]).sum()) > STICK_SLIP_SHARE * loaded
+
+    def _slips_of(self, stage: Stage) -> tuple[dict[str, Array], Array]:
+        """Columns of the slips in the steady part of a stage at constant velocity, and the
+        realization of each; none under a spring of unknown or infinite stiffness."""
+        if (
+            not stage.is_steady
+            or not math.isfinite(self.stiffness)
+            or "slips" not in self.tree.children
+        ):
+            return {}, np.empty(0)
+        slips = group_of(self.tree, "slips")
+        times = slips["start_time"].values
+        inside = (times >= self._steady_start(stage)) & (times < stage.end)
+        names = ("start_time", "end_time", "force_before", "force_drop")
+        columns = {name: slips[name].values[inside] for name in names}
+        return columns, slips["realization_index"].values[inside]
+
+    def _steady_start(self, stage: Stage) -> float:
+        """Start of the steady part of a stage [s]; its end if that has no sample."""
+        mean = self.mean_of(stage)
+        first = self.samples(stage).start + (0 if mean is None else mean.start)
+        return float(self.time[first]) if first < self.time.size else stage.end
 
     def force_at(self, stage: Stage, which: str) -> Array:
         """Spring force at the start or end of a stage [N], shape (realizations,)."""

@@ -46,6 +46,8 @@ class StickPhases:
     """Displacement of the slider from the rest after the rebound on, along the drive [m]."""
     creep_share: Array
     """Its share of the displacement of the drive in that time."""
+    rest_force: Array
+    """Force at the end of the slip before without its rebound, by the line of the loading [N]."""
 
 
 def stick_phases(
@@ -63,7 +65,7 @@ def stick_phases(
     A stiffness that is NaN stands for the median of the loading stiffness.
     """
     number = len(start_time)
-    duration, rate, measured, driven, risen = (np.full(number, np.nan) for _ in range(5))
+    duration, rate, measured, driven, risen, rest = (np.full(number, np.nan) for _ in range(6))
     duration[1:] = start_time[1:] - end_time[:-1]
     rebound = np.maximum(LOADING[0] * duration[1:], end_time[:-1] - start_time[:-1])
     first = np.searchsorted(time, end_time[:-1] + rebound)
@@ -80,6 +82,7 @@ def stick_phases(
         if scatter > MAX_SCATTER * abs(slope) * since[-1]:
             continue
         rate[slip] = slope
+        rest[slip] = at_rest + slope * (end_time[slip - 1] - time[one])
         if drive is None:
             continue
         between = drive[np.searchsorted(time, end_time[slip - 1]) : two]
@@ -91,7 +94,7 @@ def stick_phases(
     if not math.isfinite(stiffness) and np.isfinite(measured).any():
         stiffness = float(np.nanmedian(measured))
     creep = driven - risen / stiffness
-    return StickPhases(duration, rate, measured, creep * np.sign(driven), creep / driven)
+    return StickPhases(duration, rate, measured, creep * np.sign(driven), creep / driven, rest)
 
 
 def _is_one_way(drive: Array) -> bool:

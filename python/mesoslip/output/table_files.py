@@ -16,6 +16,9 @@ MARKDOWN, LATEX = ".md", ".tex"
 
 # Parts of cells and headers in LaTeX.
 LATEX_TEXTS = {
+    "inf": r"$\infty$",
+    "Δ": r"$\Delta$",
+    "<": r"$<$",
     "µ": r"\textmu{}",
     "±": r"$\pm$",
     "D_c2": r"$D_{c,2}$",
@@ -60,8 +63,11 @@ def latex(table: PrintedTable) -> str:
 
 
 def _latex(text: str) -> str:
+    """A cell or header: its special characters, infinities and powers of ten."""
     pattern = "|".join(re.escape(one) for one in LATEX_TEXTS)
-    return re.sub(pattern, lambda found: LATEX_TEXTS[found.group()], text)
+    pattern = pattern.replace("inf", r"\binf\b")
+    text = re.sub(pattern, lambda found: LATEX_TEXTS[found.group()], text)
+    return re.sub(r"(?<=[\d)])e(-?\d+)\b", r"$\\times 10^{\1}$", text)
 
 
 def markdown(table: PrintedTable) -> str:

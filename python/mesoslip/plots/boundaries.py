@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import matplotlib as mpl
 import numpy as np
+from contourpy import contour_generator
 from matplotlib.axes import Axes
+from matplotlib.contour import ContourSet
 from matplotlib.lines import Line2D
 from matplotlib.transforms import ScaledTranslation
+from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
 from mesoslip.plots.sweep_axis import SweptKey
@@ -21,9 +24,12 @@ Array = NDArray[np.float64]
 
 # The measure in whose pictures the boundaries are drawn.
 REGIME = "regime"
-# Minimum number of points along a key for smooth lines, and number of interpolated points.
-MIN_POINTS = 4
-FINE_POINTS = 200
+# Maximum ratio of the sizes of an excess on both sides of a boundary for a cubic through them; the
+# power that compresses others, as growth rates on both sides of a boundary differ by decades; and
+# number of points of a line between two edges.
+MAX_RATIO = 30.0
+COMPRESSION = 0.25
+FINE_POINTS = 20
 # Distance of the legend from axes, in sizes of its font.
 LINES_BELOW = 3.6
 
@@ -38,6 +44,17 @@ class Boundary(NamedTuple):
     is_smooth: bool = True
     is_positive: bool = False
 
+    def excess(self, data: xr.Dataset, keys: list[SweptKey]) -> Array:
+        """The mean of the measure over realizations beyond the value, in the order of the keys; of
+        a positive one in logarithms."""
+        dimensions = data[REGIME].isel(realization=0).dims
+        mean = data[self.measure].mean("realization").transpose(*dimensions).values
+        mean = mean[np.ix_(*(key.order for key in keys))]
+        excess: Array = mean - self.value
+        if self.is_positive and not np.any(mean <= 0):
+            excess = np.log(mean / self.value)
+        return excess
+
 
 BOUNDARIES = (
     Boundary("growth_rate", 0.0, "-.", "steady sliding turns linearly unstable"),
@@ -48,67 +65,104 @@ BOUNDARIES = (
 
 
 def draw_contours(axes: Axes, data: xr.Dataset, keys: list[SweptKey]) -> list[Line2D]:
-    """Draw the boundaries that a map over two keys crosses; returns lines for a legend."""
-    dimensions = data[REGIME].dims[:2]
+    """Draw the boundaries that a map over two keys crosses; returns lines for a legend.
+
+    A line crosses the edges between neighbours of different signs once, and no others.
+    """
     drawn = []
     for one in BOUNDARIES:
         if one.measure not in data:
             continue
-        values = data[one.measure].mean("realization").transpose(*dimensions).values
-        values = np.ma.masked_invalid(values[np.ix_(*(key.order for key in keys))].T)
-        if values.count() and values.min() < one.value < values.max():
-            x, y, values, level = _interpolated(one, keys, values)
-            line = axes.contour(x, y, values, [level], colors="black", linewidths=1.2)
-            line.set_linestyle(one.style)
+        lines = _lines(one, one.excess(data, keys), keys)
+        if lines:
+            curves = [_curve(line, keys) for line in lines]
+            contour = ContourSet(axes, [0.0], [curves], colors="black", linewidths=1.2)
+            contour.set_linestyle(one.style)
             drawn.append(one)
     return _handles(drawn)
 
 
-def _interpolated(
-    boundary: Boundary, keys: list[SweptKey], values: Any
-) -> tuple[Array, Array, Any, float]:
-    """Axes, values of a measure and level, interpolated between the points of a sweep.
+def _lines(boundary: Boundary, excess: Array, keys: list[SweptKey]) -> list[Array]:
+    """Lines between points of different signs, as places of shape (vertices, 2) on the edges
+    between neighbours; beside unknown values there are none."""
+    if min(excess.shape) < 2:
+        return []
+    # The lines of signs cross the edges in their middles.
+    signs = np.ma.masked_array(np.where(excess < 0, -1.0, 1.0), np.isnan(excess)).T
+    found = []
+    for line in contour_generator(z=signs, corner_mask=False).lines(0.0):
+        vertices = []
+        for column, row in np.asarray(line).tolist():
+            left, low = math.floor(column), math.floor(row)
+            x, y = keys[0].places[left], keys[1].places[low]
+            if column > left:
+                x = _crossing(boundary, keys[0].places, excess[:, low], left)
+            else:
+                y = _crossing(boundary, keys[1].places, excess[left], low)
+            vertices.append((x, y))
+        found.append(np.array(vertices))
+    return found
 
-    Cubic splines interpolate smooth measures that are known everywhere, positive ones by their
-    logarithm, over the axes as they are drawn. Other measures are not interpolated.
+
+def _crossing(boundary: Boundary, places: Array, excess: Array, left: int) -> float:
+    """Place between a point and the next, of another sign, at which the excess is 0.
+
+    It is that of a cubic spline, where that is monotone and the sizes of the excess on both sides
+    are similar. Otherwise it is that of a straight line, in the compressed excess if it is smooth.
     """
-    from scipy.interpolate import RectBivariateSpline
+    from scipy.interpolate import CubicSpline
 
-    axes = [key.values[key.order] for key in keys]
-    level = boundary.value
-    if (
-        not boundary.is_smooth
-        or not np.isfinite(np.ma.filled(values, np.nan)).all()
-        or min(values.shape) < MIN_POINTS
-    ):
-        return axes[0], axes[1], values, level
-    if boundary.is_positive and values.min() > 0:
-        values, level = np.log(values), math.log(level)
-    places = [
-        np.log(one) if key.is_logarithmic else one for one, key in zip(axes, keys, strict=True)
-    ]
-    fine = [np.linspace(one[0], one[-1], FINE_POINTS) for one in places]
-    spline = RectBivariateSpline(places[1], places[0], np.asarray(values))
-    between = spline(fine[1], fine[0])
-    x, y = (np.exp(one) if key.is_logarithmic else one for one, key in zip(fine, keys, strict=True))
-    return x, y, between, level
+    start, stop = places[left : left + 2]
+    low, high = excess[left : left + 2]
+    if boundary.is_smooth and low and high:
+        near = excess[max(left - 1, 0) : left + 3]
+        sizes = [np.nanmax(np.abs(near[near * one > 0])) for one in (low, high)]
+        if np.isfinite(excess).all() and max(sizes) <= MAX_RATIO * min(sizes):
+            cubic = Polynomial(CubicSpline(places, excess).c[::-1, left])
+            turns, zeros = (
+                [start + one.real for one in each.roots() if np.isreal(one)]
+                for each in (cubic.deriv(), cubic)
+            )
+            inside = [one for one in zeros if start < one < stop]
+            if len(inside) == 1 and not any(start < one < stop for one in turns):
+                return float(inside[0])
+        low, high = (math.copysign(abs(one) ** COMPRESSION, one) for one in (low, high))
+    return float(start + (stop - start) * low / (low - high))
+
+
+def _curve(line: Array, keys: list[SweptKey]) -> Array:
+    """A curve through places, in the units of the axes; between two of them it stays in the
+    rectangle that they span, as it is monotone."""
+    from scipy.interpolate import PchipInterpolator
+
+    sizes = np.array([np.ptp(key.places) for key in keys])
+    is_new = np.append(True, np.any(np.diff(line, axis=0) != 0, axis=1))
+    line = line[is_new]
+    if len(line) < 3:
+        fine = line
+    else:
+        is_closed = np.array_equal(line[0], line[-1])
+        whole = np.concatenate([line[-2:-1], line, line[1:2]]) if is_closed else line
+        along = np.append(0.0, np.cumsum(np.hypot(*(np.diff(whole, axis=0) / sizes).T)))
+        ends = along[1:-1] if is_closed else along
+        steps = np.linspace(ends[:-1], ends[1:], FINE_POINTS, endpoint=False, axis=1).ravel()
+        fine = PchipInterpolator(along, whole)(np.append(steps, ends[-1]))
+    return np.column_stack([key.values_at(one) for key, one in zip(keys, fine.T, strict=True)])
 
 
 def draw_crossings(axes: Axes, data: xr.Dataset, key: SweptKey) -> list[Line2D]:
-    """Draw the boundaries along one key, interpolated linearly; returns lines for a legend."""
-    values = key.values[key.order]
-    x = np.log(values) if key.is_logarithmic else values
+    """Draw the boundaries along one key; returns lines for a legend."""
     drawn = []
     for one in BOUNDARIES:
         if one.measure not in data:
             continue
-        excess = data[one.measure].mean("realization").values[key.order] - one.value
-        changes = np.flatnonzero(excess[1:] * excess[:-1] < 0)
-        for left in changes:
-            part = excess[left] / (excess[left] - excess[left + 1])
-            crossing = x[left] + part * (x[left + 1] - x[left])
-            crossing = math.exp(crossing) if key.is_logarithmic else crossing
-            axes.axvline(crossing, color="black", linestyle=one.style, linewidth=1.2)
+        excess = one.excess(data, [key])
+        with np.errstate(invalid="ignore"):
+            changes = np.flatnonzero((excess[1:] < 0) != (excess[:-1] < 0))
+        changes = changes[np.isfinite(excess[changes] + excess[changes + 1])]
+        for left in changes.tolist():
+            crossing = key.values_at(np.array(_crossing(one, key.places, excess, left)))
+            axes.axvline(float(crossing), color="black", linestyle=one.style, linewidth=1.2)
         if changes.size:
             drawn.append(one)
     return _handles(drawn)

@@ -67,18 +67,26 @@ class SweptKey:
         return np.argsort(self.values)
 
     @property
+    def places(self) -> Array:
+        """Places of the values along the axis, in increasing order."""
+        values = self.values[self.order]
+        return np.log(values) if self.is_logarithmic else values
+
+    def values_at(self, places: Array) -> Array:
+        """The values at places along the axis."""
+        return np.exp(places) if self.is_logarithmic else places
+
+    @property
     def edges(self) -> Array:
         """Midpoints between the values, and the edges of the first and the last cell."""
-        values = self.values[self.order]
-        values = np.log(values) if self.is_logarithmic else values
-        if len(values) == 1:
+        places = self.places
+        if len(places) == 1:
             only = self.values[0]
             return only * np.array([0.5, 1.5]) if only else np.array([-1.0, 1.0])
-        middles = (values[1:] + values[:-1]) / 2
-        edges = np.concatenate(
-            [[2 * values[0] - middles[0]], middles, [2 * values[-1] - middles[-1]]]
+        middles = (places[1:] + places[:-1]) / 2
+        return self.values_at(
+            np.concatenate([[2 * places[0] - middles[0]], middles, [2 * places[-1] - middles[-1]]])
         )
-        return np.exp(edges) if self.is_logarithmic else edges
 
     def apply(self, axes: Axes, which: str) -> None:
         """Label an axis ("x" or "y") of a panel."""
@@ -100,11 +108,9 @@ class SweptKey:
 
     def _without_collisions(self, axes: Axes, labels: list[str]) -> list[str]:
         """Labels of ticks, without those that would reach into the one before."""
-        edges, values = self.edges, self.values[self.order]
-        if self.is_logarithmic:
-            edges, values = np.log(edges), np.log(values)
+        edges = np.log(self.edges) if self.is_logarithmic else self.edges
         room = characters(axes_width(axes)) * (1 - COLOR_BAR)
-        places = room * (values - edges[0]) / (edges[-1] - edges[0])
+        places = room * (self.places - edges[0]) / (edges[-1] - edges[0])
         shown, end = [], -np.inf
         for place, label in zip(places.tolist(), labels, strict=True):
             fits = place - len(label) / 2 >= end

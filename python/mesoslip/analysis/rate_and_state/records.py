@@ -57,6 +57,8 @@ class Record:
     """Laws that are fitted."""
     first_stage: int = 0
     """Number of the first stage in the output."""
+    limitation: str = ""
+    """What of the output it leaves out, in words."""
 
 
 def records_of(experiment: Experiment, *, free_stiffness: bool = False) -> list[Record] | str:
@@ -81,14 +83,27 @@ def _of_trace(experiment: Experiment) -> list[Record] | str:
     whole = list(takewhile(lambda one: _has_direction(one, first), stages[changes[0] :]))
     if len(whole) < 2:
         return REVERSES
+    short = next((one for one in whole if one.is_steady and not _is_long(experiment, one)), None)
+    limitation = ""
+    if short is not None:
+        whole = list(takewhile(lambda one: one is not short, whole))
+        limitation = f"without stage {short.number} and later ones: it is too short for a step"
     if math.isinf(experiment.stiffness):
         return (
             "a prescribed slider has no spring; give the stiffness of the apparatus, or none to "
             "fit it"
         )
     single = [_single(stages[index:]) for index in changes]
-    parts = [whole, *(one for one in single if 0 < len(one) < len(whole))]
-    return [_traced(experiment, one) for one in parts]
+    ends = (whole[0].number, whole[-1].number)
+    parts = [
+        one
+        for one in single
+        if one and (one[0].number, one[-1].number) != ends and _is_long(experiment, one[-1])
+    ]
+    return [
+        replace(_traced(experiment, whole), limitation=limitation),
+        *(_traced(experiment, one) for one in parts),
+    ]
 
 
 def _is_long(experiment: Experiment, stage: Stage) -> bool:

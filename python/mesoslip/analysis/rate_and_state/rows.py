@@ -82,7 +82,10 @@ def fit_rows(
             rows.append(_empty_row(number, "", str(error)) | stage)
             continue
         preferred = preferred_law(fits) if record.noise is None else ""
-        rows += [_row(number, one, name == preferred) | stage for name, one in fits.items()]
+        for name, one in fits.items():
+            row = _row(number, one, name == preferred) | stage
+            row["note"] = "; ".join(filter(None, (row["note"], record.limitation)))
+            rows.append(row)
     return rows
 
 
@@ -106,8 +109,8 @@ def _row(number: int, found: Fit, is_preferred: bool) -> dict[str, Any]:
     law, noise = found.law, found.noise
     names = ["reference_force", "stiffness", *(["trend"] if law.with_trend else [])]
     row = _empty_row(number, law.name, _assessment(found, is_preferred))
-    # Numbers that noise may have made are none.
-    if noise.is_known or found.is_determined:
+    # Numbers that noise may have made are none, nor are those beyond the friction.
+    if found.is_determined or (noise.is_known and not found.excessive):
         names += ["a", "b", "slip_distance", "a_minus_b"]
         if law.states == 2:
             names += ["b2", "slip_distance2"]
@@ -142,6 +145,9 @@ def _assessment(found: Fit, is_preferred: bool) -> str:
     names = " and ".join(undetermined) + (" is" if len(undetermined) == 1 else " are")
     if not found.stands_out:
         return "not determined: the evolution does not stand out of the noise"
+    if found.excessive:
+        verb = "exceeds" if len(found.excessive) == 1 else "exceed"
+        return f"not determined: {' and '.join(found.excessive)} {verb} the friction itself"
     if undetermined and not noise.is_known:
         return f"not determined: {names} uncertain by more than 25 %"
     if found.is_described:

@@ -109,6 +109,13 @@ class Fit:
         return tuple(found)
 
     @property
+    def excessive(self) -> tuple[str, ...]:
+        """Names of a and b that exceed the friction, which they change by a few percent."""
+        friction = float(np.max(np.abs(self.law.points.force)))
+        names = ("a", "b", "b2")[: 1 + self.law.states]
+        return tuple(name for name in names if abs(self.value(name)) > friction)
+
+    @property
     def stands_out(self) -> bool:
         """Whether the evolution stands out of the noise; no question of noise that is known."""
         return self.noise.is_known or self.improvement > MIN_IMPROVEMENT
@@ -116,7 +123,7 @@ class Fit:
     @property
     def is_determined(self) -> bool:
         """Whether the record determines the parameters."""
-        return self.stands_out and not self.undetermined
+        return self.stands_out and not self.undetermined and not self.excessive
 
     @property
     def is_described(self) -> bool:

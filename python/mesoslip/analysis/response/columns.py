@@ -26,7 +26,9 @@ STEADY = Group(
     transient_time=Meaning("s", "duration of the discarded transient"),
     sample_count=Meaning("1", "samples after the transient, of all realizations", np.int64),
     effective_sample_count=Meaning("1", "number of independent samples with the same error"),
-    slip_share=Meaning("1", "share of the slider's displacement in slips"),
+    slip_share=Meaning(
+        "1", "share of the loading by the drive that slips relieve, without their rebound"
+    ),
     is_steady=Meaning("1", "whether the transient is over, and halves of the rest agree", np.int8),
     is_resolved=Meaning("1", "whether the stage is long enough for a reliable error", np.int8),
     note=_NOTE,

@@ -50,7 +50,10 @@ def creep_rows(experiment: Experiment, number: int) -> list[dict[str, Any]]:
             row["note"] = "too few samples in the stage"
         else:
             row |= {
-                "displacement": float((displacement[:, -1] - displacement[:, 0]).mean()),
+                # With the stretch at the jump of the force: the samples begin after it.
+                "displacement": float(
+                    (displacement[:, -1] - experiment.displacement_at_start(stage)).mean()
+                ),
                 "velocity": mean.mean,
                 "velocity_error": mean.error,
                 "transient_time": float(time[mean.start]) - stage.start if mean.start else 0.0,

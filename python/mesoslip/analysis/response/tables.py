@@ -7,10 +7,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from mesoslip.analysis.response.dataset import ratio_name, rows_of, scalars_of
 from mesoslip.output.arrays import Tree
 from mesoslip.output.table_files import PrintedTable
-from mesoslip.quantities import column, with_error, with_unit
+from mesoslip.quantities import column, probability, with_error, with_unit
 
 Row = Mapping[str, Any]
 
@@ -81,6 +83,38 @@ class _Column:
         shown = column([*values, *alike], self.unit, self.digits)
         errors = [row.get(self.error, math.nan) for row in rows]
         return (shown.head(self.header), *map(shown.text, values, errors))
+
+
+@dataclass(frozen=True)
+class _Probability(_Column):
+    """A column of probabilities, of which small ones are bounds."""
+
+    def cells(self, rows: Sequence[Row]) -> tuple[str, ...]:
+        return (self.header, *(probability(row[self.name]) for row in rows))
+
+
+@dataclass(frozen=True)
+class _Difference(_Column):
+    """A column of differences from the minimum of the rows of the same output and stage."""
+
+    def cells(self, rows: Sequence[Row]) -> tuple[str, ...]:
+        least: dict[tuple[int, int], float] = {}
+        keys = [(row["output_index"], row["stage_number"]) for row in rows]
+        for key, row in zip(keys, rows, strict=True):
+            least[key] = float(np.fmin(least.get(key, math.nan), row[self.name]))
+        differences = [
+            {**row, self.name: row[self.name] - least[key]}
+            for key, row in zip(keys, rows, strict=True)
+        ]
+        return super().cells(differences)
+
+
+@dataclass(frozen=True)
+class _Stiffness(_Column):
+    """A column of stiffnesses, left out if all are infinite."""
+
+    def is_empty(self, rows: Sequence[Row]) -> bool:
+        return all(math.isinf(row[self.name]) for row in rows)
 
 
 def force_scale(tree: Tree) -> str:
@@ -243,10 +277,10 @@ def _columns(
                     is_optional=True,
                 ),
                 force("a - b", "a_minus_b"),
-                _Column("stiffness", "stiffness", stiffness, "stiffness_error"),
+                _Stiffness("stiffness", "stiffness", stiffness, "stiffness_error"),
                 _Column("misfit", "relative_misfit", "1", digits=2),
-                _Column("p", "fit_p_value", "1", digits=2),
-                _Column("AIC", "information_criterion", "1"),
+                _Probability("p", "fit_p_value"),
+                _Difference("ΔAIC", "information_criterion", "1", digits=3),
             ),
         ),
     }

@@ -104,6 +104,35 @@ def test_slips(short, tmp_path, command):
     assert command("plot", output)[0] == 0
 
 
+def test_of_many_rows_the_first_and_the_last_are_printed(tmp_path, command, monkeypatch):
+    output = tmp_path / "run.nc"
+    many = ("--set", "run.realizations=5", "--set", "contacts.count=100", "--quiet")
+    assert command("run", ROOT / "runs" / "klein.toml", "-o", output, *many)[0] == 0
+    limit = "mesoslip.command_line.catalogues."
+    monkeypatch.setattr(f"{limit}MANY", 1000)
+    all_lines = command("slips", output)[1].splitlines()
+    count = next(one for one, line in enumerate(all_lines) if line.endswith("--csv FILE")) - 1
+    regimes = command("regime", output)[1]
+    assert all(f"realization {number}\n" in regimes for number in range(5))
+    for name, value in (("MANY", 4), ("FIRST", 2), ("LAST", 1)):
+        monkeypatch.setattr(limit + name, value)
+    lines = command("slips", output)[1].splitlines()
+    rows = [line.split() for line in lines]
+    assert rows[1:3] == [line.split() for line in all_lines[1:3]]
+    assert set(rows[3]) == {"…"}
+    assert rows[4] == all_lines[count].split()
+    assert lines[5] == f"{count} slips: the first 2 and the last 1; all with --csv FILE"
+    regimes = command("regime", output)[1]
+    assert [f"realization {one}\n" in regimes for one in range(5)] == [
+        True,
+        True,
+        False,
+        False,
+        True,
+    ]
+    assert "… (2 others, all with --json)" in regimes
+
+
 def test_plot(short, tmp_path, command):
     output = tmp_path / "short.nc"
     command("run", short, "-o", output, "--quiet")

@@ -19,6 +19,8 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import mesoslip
+import numpy as np
+import page_numbers
 import pytest
 import typer
 from conftest import ROOT, long
@@ -48,8 +50,18 @@ LONG_PAGES = [
     "tutorial-fit.md",
 ]
 
+# Those that are run without being made shorter too.
+AS_THEY_STAND = [
+    "how-to/measured-surface.md",
+    "how-to/slide-hold-slide.md",
+    "teaching.md",
+    "tutorial-fit.md",
+]
+
 FENCE = re.compile(r"^(?P<fence>`{3,}|:{3,})(?P<language>\S*).*$")
 LEFT_OUT = re.compile(r"^(?:<!--|%)\s*not run: \S.*$")
+# Language of a comment on numbers.
+NUMBERS = "numbers"
 FILE = re.compile(r"# (?P<path>[\w/.-]+\.toml)")
 # Commands whose arguments are parsed and no more: they do not end.
 PARSED_ONLY = {"explore"}
@@ -87,12 +99,23 @@ STATUS = re.compile(r"exit status (\d+)")
 
 @dataclass(frozen=True)
 class Block:
-    """A fenced block: where it starts, in which language, and whether it is left out."""
+    """A fenced block or a comment on numbers: where it starts, its language, the line before."""
 
     line: int
     language: str
     text: str
-    is_left_out: bool
+    before: str
+
+    @property
+    def is_left_out(self):
+        """Whether its commands are only parsed."""
+        return bool(LEFT_OUT.match(self.before))
+
+    @property
+    def printed_share(self):
+        """Share by which numbers of printed lines may differ; None if they are not compared."""
+        match = page_numbers.PRINTED.match(self.before)
+        return None if match is None else float(match["percent"] or 100 * page_numbers.SHARE) / 100
 
 
 def with_long_ones(pages):
@@ -104,14 +127,14 @@ def with_long_ones(pages):
 def blocks_of(page):
     """The fenced blocks of a page."""
     found, fence, language, start = [], "", "", 0
-    inside, before, left_out = [], "", False
+    inside, before, above = [], "", ""
     for number, line in enumerate(page.read_text(encoding="utf-8").splitlines(), 1):
         match = FENCE.match(line)
-        if not fence and match:
-            fence, language, start = match["fence"], match["language"], number
-            inside, left_out = [], bool(LEFT_OUT.match(before))
+        if not fence and (match or line == page_numbers.START):
+            fence, language = (match["fence"], match["language"]) if match else ("-->", NUMBERS)
+            start, inside, above = number, [], before
         elif fence and line.strip() == fence:
-            found.append(Block(start, language, "\n".join(inside), left_out))
+            found.append(Block(start, language, "\n".join(inside), above))
             fence = ""
         elif fence:
             inside.append(line)
@@ -198,16 +221,17 @@ def parse_command(words):
 
 
 def run_command(words, comment, command):
-    """Run a command, unless it takes long or names what a reader has to give."""
+    """Run a command, unless it takes long or names what a reader has to give; what it prints."""
     _, name, *arguments = words
     is_placeholder = any(PLACEHOLDER.search(one) for one in arguments)
     if name in PARSED_ONLY or is_placeholder or any(one.endswith(MOVIES) for one in arguments):
-        return
+        return ""
     if name == "example":
         Path(f"{Path(arguments[-1]).name}.toml").unlink(missing_ok=True)
     expected = STATUS.search(comment)
     status, out, err = command(name, *arguments)
     assert status == (int(expected[1]) if expected else 0), f"{shlex.join(words)}\n{out}{err}"
+    return out + err
 
 
 def needs_output(page):
@@ -234,21 +258,29 @@ def test_a_long_page_is_right_as_far_as_that_is_seen_without_runs(name, workshop
 
 @pytest.mark.long
 @pytest.mark.timeout(0)
-@pytest.mark.parametrize("name", ["tutorial-fit.md", "how-to/slide-hold-slide.md"])
+@pytest.mark.parametrize("name", AS_THEY_STAND)
 def test_a_page_as_it_stands(name, workshop, command, monkeypatch):
-    """Those whose runs are made shorter for the test above."""
+    """Those whose runs are made shorter for the test above, with the numbers on them."""
     for path in (ROOT / "runs").rglob("*.toml"):
         shutil.copy(path, workshop / path.relative_to(ROOT))
+    shutil.copy(ROOT / "runs" / "klein.toml", workshop)
     monkeypatch.setattr(sys.modules[__name__], "SHORTER", {})
     type_page(DOCS / name, workshop, command)
 
 
 def type_page(page, workshop, command, *, is_run=True):
-    """Type what a page has in its blocks, or only check its files and the arguments of commands."""
+    """Type what a page has in its blocks, or only check its files and the arguments of commands.
+
+    Numbers are compared if the page's runs are not made shorter.
+    """
     blocks = blocks_of(page)
     if is_run and needs_output(page):
         assert command("run", "klein.toml", "--quiet")[0] == 0
-    names = {"__name__": "page"}
+    names = {"__name__": "page", "mesoslip": mesoslip, "np": np}
+    printed, is_compared = (
+        "",
+        is_run and (not SHORTER or page not in map(DOCS.joinpath, LONG_PAGES)),
+    )
     for block in blocks:
         place = f"{page.relative_to(ROOT)}, line {block.line}"
         is_shell = block.language in {"", "sh", "bash", "console"}
@@ -260,17 +292,51 @@ def type_page(page, workshop, command, *, is_run=True):
             elif block.language == "python" and is_run:
                 exec(compile(block.text, place, "exec"), names)
                 plt.close("all")
+            elif block.language == NUMBERS and is_compared:
+                text = page.read_text(encoding="utf-8")
+                wrong = page_numbers.wrong_numbers(block.text, text, names)
+                assert not wrong, "\n".join(wrong)
+            elif block.printed_share is not None:
+                if is_compared:
+                    wrong = page_numbers.not_printed(block.text, printed, block.printed_share)
+                    assert not wrong, "\n".join(wrong)
             elif is_shell:
                 for words, comment in commands_of(block.text):
                     if words[0] == "mesoslip":
                         parse_command(words)
                         if is_run and not block.is_left_out:
-                            run_command(words, comment, command)
+                            printed += run_command(words, comment, command)
                     elif words[0] == "make":
                         check_targets(words[1:])
         except Exception as error:
             error.add_note(f"in {place}")
             raise
+
+
+def test_wrong_numbers_on_a_page_are_found():
+    page = (
+        "The slip at 1.915 s takes 12.3 ms, at 53 214 breaks. <!-- numbers 1.915 s 12.3 ms 53 214"
+    )
+    names = {"start": 1.9154, "duration": 12.51e-3, "breaks": 53214}
+    good = "twice = 2 * duration\n1.915 s = start\n12.3 ms ~ 2 % = twice / 2\n53 214 = breaks"
+    assert page_numbers.wrong_numbers(good, page, names) == []
+    bad = "1.915 s = start + 2e-3\n12.3 ms = duration\n53 214 = breaks - 2\n1.8 s = 1.8"
+    found = page_numbers.wrong_numbers(bad, page, names)
+    assert [one.partition(" is ")[2] for one in found] == [
+        "1.9174",
+        "12.51",
+        "53212",
+        "not on the page",
+    ]
+    printed = "out.nc: 7 slips, noise 49.1 nN\n  delay  1.315   1.29 to 1.33"
+    assert page_numbers.not_printed("out.nc: 7 slips, noise 49.2 nN", printed, 0.01) == []
+    assert page_numbers.not_printed("delay  1.32  1.29 to 1.33", printed, 0.01) == []
+    for line in (
+        "out.nc: 8 slips, noise 49.1 nN",
+        "delay 1.315 1.29",
+        "out.nc: 7 falls, noise 49.1 nN",
+    ):
+        assert page_numbers.not_printed(line, printed, 0.01)
 
 
 @pytest.mark.parametrize(("page", "passage", "form", "names"), LISTS)

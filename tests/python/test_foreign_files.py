@@ -146,8 +146,10 @@ READERS = {
 }
 
 
+@pytest.mark.parametrize("rows", [3, 2**20])
 @pytest.mark.parametrize(("where", "damage"), WRONG_ROWS)
-def test_rows_and_times_that_cannot_be_right_are_refused(output, where, damage):
+def test_rows_and_times_that_cannot_be_right_are_refused(output, where, damage, rows, monkeypatch):
+    monkeypatch.setattr("mesoslip.output.validity.MAX_ROWS", rows)
     with h5py.File(output, "r+") as file:
         values = file[where][...]
         damage(values)

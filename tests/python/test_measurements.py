@@ -41,6 +41,61 @@ def test_files_in_many_styles_are_read_as_they_were_made(tmp_path, number):
 UNITS = {"time": "s", "force": "uN"}
 
 
+def test_text_in_blocks_is_read_as_in_one(tmp_path, monkeypatch):
+    """Irregular rows, repeated headers and a damaged number, wherever a block ends."""
+    header = "time_s\tforce_N\n"
+    rows = [f"{0.01 * n:.2f}\t{3 + np.sin(n):.6f}\n" for n in range(400)]
+    rows[50] = "# restarted\n"
+    rows[51] = header
+    rows[120] = "1.20\t\n"
+    rows[200] = "2.00\tOVER\n"
+    whole = record_of(tmp_path / "a.txt", header + "".join(rows))
+    assert len(whole.time) == 396
+    monkeypatch.setattr("mesoslip.measured.reading.text.BLOCK", 101)
+    blocks = record_of(tmp_path / "a.txt", header + "".join(rows)[:-1])
+    np.testing.assert_array_equal(blocks.time, whole.time)
+    np.testing.assert_array_equal(blocks.force, whole.force)
+    assert blocks.report == whole.report
+    assert "rows with fewer decimal signs" in "\n".join(blocks.report)
+
+
+def test_a_long_text_takes_little_more_memory_than_its_numbers(tmp_path, monkeypatch):
+    """Two columns of 8 bytes, their file, its places and its numbers in use: no line by itself."""
+    monkeypatch.setattr("mesoslip.measured.reading.text.BLOCK", 2**15)
+    count = 20_000
+    text = "time_s\tforce_N\n" + "".join(f"{0.001 * n:.3f}\t{n % 7}.5\n" for n in range(count))
+    record_of(tmp_path / "a.txt", text[:1000])
+    (tmp_path / "a.txt").write_text(text, encoding="utf-8")
+    tracemalloc.start()
+    try:
+        understand(tmp_path / "a.txt")
+        assert tracemalloc.get_traced_memory()[1] < 120 * count
+    finally:
+        tracemalloc.stop()
+
+
+def test_samples_that_continue_their_neighbours_are_numbers(tmp_path):
+    """A trace that passes a number that elsewhere stands for a missing one, in its range and in a
+    short fall far below it."""
+    experiment = understand(
+        ROOT / "runs" / "fit" / "experiment.csv", rate="1 kHz", velocity="0.1 um/s"
+    )
+    assert "-999" not in "\n".join(experiment.record.report)
+    force = np.full(400, 500.0) + np.arange(400) % 3
+    fall = np.linspace(500, -1200, 18).round()
+    fall[np.argmin(np.abs(fall + 999))] = -999
+    force[200:218] = fall
+    rows = [f"{0.01 * n:.2f}\t{one:g}\n" for n, one in enumerate(force)]
+    record = record_of(tmp_path / "a.txt", "time_s\tforce_N\n" + "".join(rows))
+    np.testing.assert_array_equal(record.force, force)
+    assert "-999" not in "\n".join(record.report)
+    for at in (60, 61, 300):
+        rows[at] = f"{0.01 * at:.2f}\t-999\n"
+    record = record_of(tmp_path / "a.txt", "time_s\tforce_N\n" + "".join(rows))
+    assert len(record.force) == 397
+    assert "-999 taken as missing in 3 lines" in "\n".join(record.report)
+
+
 def test_data_sets_take_bounded_memory(tmp_path, monkeypatch):
     path = tmp_path / "run.h5"
     with h5py.File(path, "w") as file:
@@ -263,6 +318,15 @@ def test_a_late_block_goes_where_it_belongs():
     np.testing.assert_array_equal(found, np.arange(40))
     np.testing.assert_array_equal(force, np.arange(40))
     assert "put in order" in notes
+
+
+def test_all_columns_of_a_late_block_go_where_it_belongs(tmp_path):
+    order = np.r_[0:10, 20:30, 10:20, 30:40]
+    rows = [f"{0.1 * n:.1f}\t{n + 0.25}\t{2 * n}\n" for n in order]
+    record = record_of(tmp_path / "a.txt", "time_s\tforce_N\tload_point_um\n" + "".join(rows))
+    np.testing.assert_allclose(record.time, 0.1 * np.arange(40))
+    np.testing.assert_array_equal(record.force, np.arange(40) + 0.25)
+    np.testing.assert_allclose(record.load_point, 2e-6 * np.arange(40))
 
 
 def test_one_time_out_of_order_is_left_out():

@@ -14,14 +14,16 @@ from conftest import ROOT, long
 from kinds import configuration
 from matplotlib.figure import Figure
 from mesoslip.output import files
+from mesoslip.output.arrays import Stored
 from mesoslip.output.kinds import KINDS as OUTPUTS
-from mesoslip.output.writing import write
+from mesoslip.output.writing import write, write_results
 from mesoslip.plots import lines
 from mesoslip.plots.extent import MAX_PARTS, Extent
 from mesoslip.plots.style import curve_style, styled
 from mesoslip.plots.views import VIEWS, names_of_views
 from mesoslip.plots.views.layers import layer_motion
 from mesoslip.plots.views.sweep import CHOICE_COLORS
+from mesoslip.simulation.run_realizations import run_realizations
 
 pytestmark = pytest.mark.usefixtures("few_replicas")
 
@@ -583,3 +585,26 @@ def test_a_slip_without_finer_samples_is_drawn_as_recorded(runs):
     fine = mesoslip.plot(runs["plain"]).axes[1]
     assert fine.get_legend().get_title().get_text() == "largest slip (shaded at left)"
     assert fine.lines[0].get_linestyle() == "-"
+
+
+def test_a_picture_reads_the_realizations_that_it_draws(klein, tmp_path, monkeypatch):
+    """Of 60 with finer traces: no variable of all of them, and not the finer times of all."""
+    config = klein(run__realizations=60, contacts__count=20, run__duration=2.5)
+    path = tmp_path / "many.nc"
+    write_results(run_realizations(config.replace("output.slip_interval=0.1 ms")), path)
+    read = []
+
+    def values(one):
+        index = tuple(one.part.get(name, slice(None)) for name in one.stored.dimensions)
+        found = np.asarray(one.stored[index or ...])
+        read.append((one.stored.name, found.size))
+        return found
+
+    monkeypatch.setattr(Stored, "values", property(values))
+    monkeypatch.setattr("mesoslip.output.validity.MAX_ROWS", 1000)
+    figure = mesoslip.plot(path)
+    assert figure.axes[0].get_title(loc="left").endswith("grey: 20 of the other 59 realizations")
+    samples = config.expected_duration / config.output_interval + 1
+    assert max(size for _, size in read) <= samples
+    names = {name for name, _ in read}
+    assert {"spring_force", "sample_time", "realization_index"} <= names

@@ -178,9 +178,16 @@ def _statistics(values: Mapping[str, float], unit: float) -> tuple[str, ...]:
     return tuple(f"{one:.{decimals}f}" for one in (mean, deviation, low, high))
 
 
-def catalogue_of(tree: Tree) -> Catalogue:
-    """The catalogue of slips of an output of a run or a measured trace."""
+def catalogue_of(tree: Tree, realization: int | None = None) -> Catalogue:
+    """The catalogue of slips of an output of a run or a measured trace.
+
+    If a realization is given, it has the slips of that one, and the traces of others are not read.
+    """
     data = group_of(tree, "slips")
+    if realization is not None:
+        rows = data["realization_index"].values
+        start, end = np.searchsorted(rows, (realization, realization + 1))
+        data = data.isel(slip=slice(int(start), int(end)))
     start, owners = data["start_time"].values, data["realization_index"].values
     waiting = np.diff(start, prepend=np.nan)
     if start.size:
@@ -263,13 +270,14 @@ def _stick_columns(
     is_good = np.ones(len(time), dtype=bool)
     if "noise" in tree.children:
         is_good = ~np.isin(time, group_of(tree, "noise")["impulse_time"].values)
-    for owner in np.unique(owners):
+    for owner in np.unique(owners).tolist():
         mine = owners == owner
-        force = root[name].values[owner].astype(float)
+        force = root.variables[name].isel(realization=owner).values.astype(float)
         known = is_good & np.isfinite(force)
         drive = None
         if "drive_displacement" in root:
-            drive = root["drive_displacement"].values[owner].astype(float)[known]
+            drive = root.variables["drive_displacement"].isel(realization=owner).values
+            drive = drive.astype(float)[known]
             drive = drive if np.isfinite(drive).all() else None
         ends = ("start_time", "end_time", "force_before")
         phases = stick_phases(

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from collections.abc import Sequence
+from typing import Annotated, Any, TypeVar
 
 import typer
 
@@ -19,6 +20,16 @@ from mesoslip.command_line.options import (
     write_table,
 )
 from mesoslip.quantities import column, with_error
+
+# Numbers of rows that are printed of a table with many more, at its beginning and end.
+FIRST, LAST = 20, 5
+MANY = 60
+Row = TypeVar("Row")
+
+
+def ends_of(rows: Sequence[Row], gap: Row) -> Sequence[Row]:
+    """Rows of a table for print; of many the first and the last with a gap between them."""
+    return rows if len(rows) <= MANY else [*rows[:FIRST], gap, *rows[-LAST:]]
 
 
 def slips(
@@ -41,8 +52,14 @@ def slips(
         answer = {"slips": rows, "statistics": catalogue.statistics}
         print_json(answer if counts is None else answer | {"slip_counts": counts})
         return
-    print_table((for_print.head, *for_print.rows))
-    typer.echo(f"{counted(len(rows), 'slip')}{'; all columns with --csv FILE' if rows else ''}")
+    shown = ends_of(for_print.rows, ("…",) * len(for_print.head))
+    print_table((for_print.head, *shown))
+    rest = (
+        f": the first {FIRST} and the last {LAST}; all"
+        if len(shown) < len(rows)
+        else "; all columns"
+    )
+    typer.echo(f"{counted(len(rows), 'slip')}{f'{rest} with --csv FILE' if rows else ''}")
     if rows:
         statistics = catalogue.printed_statistics()
         typer.echo("")
@@ -159,7 +176,12 @@ def regime(output: OutputArgument, as_json: JsonOption = False) -> None:
         typer.echo(f"a slider under a force has no cycles; in its last stage it {motion}")
         typer.echo("mesoslip response prints creep and static friction")
         return
-    for index, one in zip(realizations, results, strict=True):
+    shown = ends_of(list(zip(realizations, results, strict=True)), None)
+    for pair in shown:
+        if pair is None:
+            typer.echo(f"… ({len(results) - len(shown) + 1} others, all with --json)")
+            continue
+        index, one = pair
         if len(results) > 1:
             typer.echo(f"realization {index}")
         for name, meaning in REGIME.items():

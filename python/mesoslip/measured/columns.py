@@ -42,6 +42,8 @@ SENTINELS = (-9999.0, -99999.0, -999.0, -999.25, -9999.25, 9999.0, 99999.0, 9999
 MIN_ALWAYS = 1e30
 # Minimum distance from the range of 80 % of the others, over that range.
 SENTINEL_DISTANCE = 1.0
+# Percentage of steps between samples that are those of an ordinary signal.
+USUAL_STEPS = 99.0
 # Maximum correlation of steps of the force with those of the displacement of a slider.
 MAX_SLIDER = -0.3
 # Quantities that are a force or become one, in order of preference.
@@ -360,8 +362,18 @@ def values_of(table: Table, name: str, used: Used) -> Array:
             f"{table.path}: line {first.line}: {column}: the {name.replace('_', ' ')}, "
             f"{shown(first.text)}, is not a number{first.hint}{more}"
         )
-    values: Array = (table.values[used.index] - used.offset) * used.size
-    return values
+    recorded: Array = table.values[used.index]
+    if used.offset == 0 and used.size == 1:
+        return recorded
+    return (recorded - used.offset) * used.size
+
+
+def _continues(values: Array, rows: NDArray[np.intp], usual: float) -> NDArray[np.bool]:
+    """Whether rows differ from a neighbour by no more than a usual step."""
+    steps = np.abs(np.diff(values, prepend=np.inf, append=np.inf))
+    # Equal neighbours may be missing as well.
+    steps[steps == 0] = np.inf
+    return np.asarray(np.fmin(steps[rows], steps[rows + 1]) <= usual)
 
 
 def sentinels(table: Table, used: Used) -> tuple[NDArray[np.bool], str]:
@@ -369,13 +381,16 @@ def sentinels(table: Table, used: Used) -> tuple[NDArray[np.bool], str]:
     values = table.values[used.index]
     finite = np.isfinite(values)
     found = finite & (np.abs(values) >= MIN_ALWAYS)
-    rest = values[finite & ~np.isin(values, SENTINELS) & ~found]
-    if rest.size:
+    known = finite & np.isin(values, SENTINELS)
+    rest = values[finite & ~known & ~found]
+    if rest.size and known.any():
         # Percentiles exclude impulses and damaged rows.
         low, high = (float(one) for one in np.percentile(rest, [10, 90]))
         span = SENTINEL_DISTANCE * (high - low)
-        known = finite & np.isin(values, SENTINELS)
         far = (values < low - span) | (values > high + span)
+        # A sample that continues its neighbours is an ordinary one.
+        usual = float(np.percentile(np.abs(np.diff(rest)), USUAL_STEPS)) if rest.size > 1 else 0.0
+        known[known] = ~_continues(values, np.flatnonzero(known), usual)
         near = known & ~far & ((values < low) | (values > high))
         found |= known & far
         if near.any() and not found.any():

@@ -83,7 +83,8 @@ def read_record(path: Path, trace: TraceDescription) -> Record:
     for name, used in columns.used.items():
         values[name] = values_of(table, name, used)
         missing, note = sentinels(table, used)
-        values[name][missing] = np.nan
+        if missing.any():
+            values[name] = np.where(missing, np.nan, values[name])
         notes += [note] if note else []
     try:
         made = _force(values, trace)
@@ -107,11 +108,14 @@ def read_record(path: Path, trace: TraceDescription) -> Record:
             f"{' between start and end' if not inside.all() else ''}; a trace needs at least "
             f"{MIN_SAMPLES}"
         )
-    others = [one[rows] for name, one in values.items() if name != "time"]
-    order = in_order(path, time[rows], np.array(others), table.lines[rows], trace.part, table.row)
+    # A slice has no copies.
+    usable = rows if len(rows) < len(whole) else slice(None)
+    times = time[usable]
+    others = [one[usable] for name, one in values.items() if name != "time"]
+    order = in_order(path, times, others, table.lines[usable], trace.part, table.row)
     if len(order.rows) < MIN_SAMPLES:
         raise FileError(f"{path}: has {len(order.rows)} samples whose times increase")
-    picked = rows[order.rows]
+    picked = usable if order.time is times else rows[order.rows]
     notes += order.notes
     for name in OTHERS:
         if name in values and (count := int(np.isnan(values[name][picked]).sum())):

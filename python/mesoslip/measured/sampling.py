@@ -48,14 +48,14 @@ class Order:
 
 
 def in_order(
-    path: Path, time: Array, values: Array, lines: Numbers, part: int | None, row: str
+    path: Path, time: Array, values: Sequence[Array], lines: Numbers, part: int | None, row: str
 ) -> Order:
     """Put samples into the order of their times [s].
 
-    Rows that were written twice, with the same values of shape (quantities, samples), are used
-    once; blocks that were written late are put where they belong; single rows whose time is out of
-    order are left out. A clock that starts again makes parts, of which one is used: the given part,
-    from 1, or the longest. In messages, ``row`` is the word for a line.
+    Rows that were written twice, with the same values of all quantities, are used once; blocks that
+    were written late are put where they belong; single rows whose time is out of order are left
+    out. A clock that starts again makes parts, of which one is used: the given part, from 1, or the
+    longest. In messages, ``row`` is the word for a line.
     """
     notes: list[str] = []
     rows = np.arange(len(time))
@@ -100,10 +100,15 @@ def _runs(time: Array, rows: Numbers) -> list[Numbers]:
 
 
 def _without_repeated(
-    time: Array, values: Array, rows: Numbers, lines: Numbers, notes: list[str], row: str
+    time: Array,
+    values: Sequence[Array],
+    rows: Numbers,
+    lines: Numbers,
+    notes: list[str],
+    row: str,
 ) -> Numbers:
     """Leave out rows that repeat earlier ones in time and values."""
-    every = np.ascontiguousarray(np.vstack([time, values])[:, rows].T) + 0.0
+    every = np.ascontiguousarray(np.vstack([time, *values])[:, rows].T) + 0.0
     # Missing numbers are equal to each other.
     every[np.isnan(every)] = np.inf
     view = every.view([("", every.dtype)] * every.shape[1]).ravel()
@@ -226,6 +231,10 @@ def sampling_report(time: Array) -> list[str]:
 
 def _usual(steps: Array) -> Array:
     """The median of the intervals around each one."""
+    low, high = float(steps.min()), float(steps.max())
+    if high < MIN_GAP * low:
+        # One rate, without gaps.
+        return np.broadcast_to(np.median(steps), steps.shape)
     from scipy.ndimage import median_filter
 
     size = min(2 * AROUND + 1, len(steps) - (1 - len(steps) % 2))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -52,12 +53,16 @@ def samples(tree: Tree, realization: int = 0) -> list[Samples]:
     parts = [Samples(root, "time", root["time"].values)]
     if "slip_traces" in tree.children:
         fine = group_of(tree, "slip_traces")
-        times, start = fine["sample_time"].values, 0
+        start, end = 0, fine.sizes["sample"]
         if tree.sizes["realization"] > 1:
-            owners = fine["realization_index"].values
-            start, end = np.searchsorted(owners, (realization, realization + 1))
-            times = times[start:end]
-        parts.append(Samples(fine, "sample", times, int(start)))
+            # Rows of all realizations may take more memory than there is.
+            owner = fine.variables["realization_index"]
+            start, end = (
+                bisect_left(range(end), one, key=lambda row: int(owner[row].values))
+                for one in (realization, realization + 1)
+            )
+        times = fine.variables["sample_time"].isel(sample=slice(start, end)).values
+        parts.append(Samples(fine, "sample", times, start))
     return parts
 
 

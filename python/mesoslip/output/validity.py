@@ -3,15 +3,24 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mesoslip.errors import FileError
 from mesoslip.output import variables
 from mesoslip.output.access import group_of, is_measured
-from mesoslip.output.arrays import Tree
+from mesoslip.output.arrays import Arrays, Tree
 from mesoslip.output.provenance import version
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+# Rows that are read at once.
+MAX_ROWS = 2**20
 
 # Dimensions and variables that commands need: of the root of a run, and of groups that it may have.
 ROOT_NEEDS = tuple(variables.TRACE)[:6]
@@ -118,44 +127,67 @@ def _wrong_layout(tree: Tree) -> list[str]:
 
 def _wrong_rows(tree: Tree) -> list[str]:
     """Rows of realizations that the output does not have, and times that go back."""
-    wrong, count = [], tree.sizes.get("realization", 0)
     for group, (name, end) in TIMES.items():
         if group and group not in tree.children:
             continue
         data = group_of(tree, group) if group else tree.to_dataset()
         if name not in data or (group and "realization_index" not in data):
             continue
-        times = data[name].values
-        is_new = np.zeros(np.diff(times).shape, dtype=bool)
-        if group:
-            if "realization" not in tree.sizes:
-                wrong.append(f"dimension realization, of rows in {group}, is missing")
-                break
-            owners = data["realization_index"].values
-            is_new = np.diff(owners) > 0
-            is_wrong = ~((owners >= 0) & (owners < count))
-            is_wrong[1:] |= np.diff(owners) < 0
-            wrong += [
-                f"{group}/realization_index is {owners[row]} in row {row}; expected the indices "
-                f"of the {count} realizations in order"
-                for row in np.flatnonzero(is_wrong)[:1]
-            ]
-        # Only rows of catalogues may have the same time, as in a drive that stands still.
-        steps = np.diff(times)
-        is_wrong = ~np.isfinite(times)
-        is_wrong[1:] |= ~((steps >= 0 if group else steps > 0) | is_new)
+        if group and "realization" not in tree.sizes:
+            return [f"dimension realization, of rows in {group}, is missing"]
+        dimension = data[name].dims[0]
+        names = [one for one in (name, end, *(["realization_index"] * bool(group))) if one in data]
+        for start in range(0, data.sizes[dimension], MAX_ROWS):
+            # The last row of the block before is compared with the first one of this block.
+            rows = slice(max(start - 1, 0), start + MAX_ROWS)
+            columns = {one: _part(data, one, dimension, rows) for one in names}
+            wrong = _wrong_in_block(columns, group, rows.start, tree.sizes.get("realization", 0))
+            if wrong:
+                return wrong
+    return []
+
+
+def _part(data: xr.Dataset | Arrays, name: str, dimension: str, rows: slice) -> NDArray[Any]:
+    """Rows of a variable; all of them are kept for those who need them next."""
+    if data.sizes[dimension] <= MAX_ROWS:
+        return np.asarray(data[name].values)
+    return np.asarray(data.variables[name].isel({dimension: rows}).values)
+
+
+def _wrong_in_block(
+    columns: Mapping[str, NDArray[Any]], group: str, first: int, count: int
+) -> list[str]:
+    """What is wrong with rows from the first one on, of an output with a number of realizations."""
+    wrong: list[str] = []
+    name, end = TIMES[group]
+    times = columns[name]
+    steps = np.diff(times)
+    is_new = np.zeros(steps.shape, dtype=bool)
+    if group:
+        owners = columns["realization_index"]
+        is_new = np.diff(owners) > 0
+        is_wrong = ~((owners >= 0) & (owners < count))
+        is_wrong[1:] |= np.diff(owners) < 0
         wrong += [
-            f"{group}/{name} is {times[row]:.9g} s in row {row}".lstrip("/")
-            + (f" after {times[row - 1]:.9g} s" if row else "")
-            + "; expected times in order"
+            f"{group}/realization_index is {owners[row]} in row {first + row}; expected the "
+            f"indices of the {count} realizations in order"
             for row in np.flatnonzero(is_wrong)[:1]
         ]
-        if end in data:
-            wrong += [
-                f"{group}/{end} is {data[end].values[row]:.9g} s in row {row}, which starts at "
-                f"{times[row]:.9g} s"
-                for row in np.flatnonzero(~(data[end].values >= times))[:1]
-            ]
+    # Only rows of catalogues may have the same time, as in a drive that stands still.
+    is_wrong = ~np.isfinite(times)
+    is_wrong[1:] |= ~((steps >= 0 if group else steps > 0) | is_new)
+    wrong += [
+        f"{group}/{name} is {times[row]:.9g} s in row {first + row}".lstrip("/")
+        + (f" after {times[row - 1]:.9g} s" if row else "")
+        + "; expected times in order"
+        for row in np.flatnonzero(is_wrong)[:1]
+    ]
+    if end in columns:
+        wrong += [
+            f"{group}/{end} is {columns[end][row]:.9g} s in row {first + row}, which starts at "
+            f"{times[row]:.9g} s"
+            for row in np.flatnonzero(~(columns[end] >= times))[:1]
+        ]
     return wrong
 
 

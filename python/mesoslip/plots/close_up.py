@@ -24,13 +24,9 @@ Slip = Mapping[str, float]
 
 def largest_slip(tree: Tree, extent: Extent = EVERYTHING) -> Slip | None:
     """The slip with the largest drop of the spring force, if there is a slip."""
-    columns = catalogue_of(tree).columns
+    columns = catalogue_of(tree, extent.first).columns
     starts = columns["start_time"].values
-    inside = np.flatnonzero(
-        (columns["realization_index"].values == extent.first)
-        & (starts >= extent.start)
-        & (starts <= extent.end)
-    )
+    inside = np.flatnonzero((starts >= extent.start) & (starts <= extent.end))
     if inside.size == 0:
         return None
     largest = inside[np.argmax(np.abs(columns["force_drop"].values[inside]))]

@@ -23,4 +23,5 @@ def read_file(path: Path, *, decimal: str | None = None, has_headers: bool = Fal
             return read(path, data)
     if path.suffix == ".toml":
         raise FileError(f"{path}: is a configuration, not a measurement")
-    return read_text(path, text_of(path, data), decimal=decimal, has_headers=has_headers)
+    data = text_of(path, data)
+    return read_text(path, data, decimal=decimal, has_headers=has_headers)

@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -274,7 +275,7 @@ def _splittings(line: str, delimiter: str) -> Iterator[list[str]]:
 def check_decimal_comma(path: Path, lines: Sequence[str], layout: Layout) -> None:
     """Check that commas in numbers are decimal: at least one of them cannot group digits."""
     example = None
-    for number, line in enumerate(lines[layout.first :], layout.first + 1):
+    for number, line in enumerate(islice(lines, layout.first, None), layout.first + 1):
         if "," not in line:
             continue
         try:

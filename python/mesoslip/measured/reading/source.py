@@ -22,6 +22,10 @@ HEAD = 4096
 # Maximum share of null characters in a damaged text.
 MAX_NULLS = 0.01
 
+NEWLINE = b"\n"
+# Line breaks and minus signs, and what stands for them.
+PLAIN = ((b"\r\n", NEWLINE), (b"\r", NEWLINE), ("\N{MINUS SIGN}".encode(), b"-"))
+
 # Compressions: their first bytes, and their readers.
 COMPRESSIONS: dict[str, tuple[bytes, Callable[[IO[bytes]], Any]]] = {
     "gzip": (b"\x1f\x8b", lambda file: gzip.GzipFile(fileobj=file)),
@@ -94,25 +98,27 @@ def _limited(path: Path, file: IO[bytes]) -> bytes:
     return data
 
 
-def text_of(path: Path, data: bytes) -> str:
-    """The text of a file: UTF-8, UTF-16 or an encoding of Western Europe.
+def text_of(path: Path, data: bytes) -> bytes:
+    """The text of a file in UTF-8, from that, UTF-16 or an encoding of Western Europe.
 
-    Line breaks are `\\n`, and minus signs hyphens.
+    Line breaks are `\\n`, and minus signs hyphens. A text that is like this already is not copied.
     """
-    text = _decoded(data)
-    if text is not None and 0 < text.count("\0") < MAX_NULLS * len(text):
-        at = text.index("\0")
-        raise FileError(f"{path}: line {text.count(chr(10), 0, at) + 1}: has a null character")
-    if text is None or "\0" in text:
+    text = _in_utf8(data)
+    if text is not None and 0 < text.count(b"\0") < MAX_NULLS * len(text):
+        at = text.index(b"\0")
+        raise FileError(f"{path}: line {text.count(NEWLINE, 0, at) + 1}: has a null character")
+    if text is None or b"\0" in text:
         raise FileError(
             f"{path}: is neither text nor MATLAB, HDF5, netCDF or .npz: it begins with "
             f"{shown(data[:12])}"
         )
-    text = text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
-    return text.replace("\N{MINUS SIGN}", "-")
+    for old, new in PLAIN:
+        if old in text:
+            text = text.replace(old, new)
+    return text.removeprefix("\ufeff".encode())
 
 
-def _decoded(data: bytes) -> str | None:
+def _in_utf8(data: bytes) -> bytes | None:
     head = data[:HEAD]
     if head.startswith((b"\xff\xfe", b"\xfe\xff")):
         encodings = ["utf-16"]
@@ -120,11 +126,14 @@ def _decoded(data: bytes) -> str | None:
         # UTF-16 without a mark has a null beside each Latin character.
         little = head[1::2].count(0) > head[0::2].count(0)
         encodings = ["utf-16-le" if little else "utf-16-be"]
+    elif data.isascii():
+        return data
     else:
         encodings = ["utf-8", "cp1252", "latin-1"]
     for encoding in encodings:
         try:
-            return data.decode(encoding)
+            text = data.decode(encoding)
         except UnicodeDecodeError:
             continue
+        return data if encoding == "utf-8" else text.encode()
     return None

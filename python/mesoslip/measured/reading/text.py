@@ -1,6 +1,7 @@
 """Tables of text. Regular rows are read by pandas, all others cell by cell; no number is guessed.
 
-A row is regular if it has the usual number of cells and only characters of numbers.
+Text is read block by block, so that it takes little more memory than its numbers and itself. A row
+is regular if it has the usual number of cells and only characters of numbers.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
+from typing import overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,18 +30,54 @@ COMPARED = 20
 MAX_ODD = 1e-3
 POINT = "; numbers have a decimal point, and a comma would begin another cell"
 
+NEWLINE = ord("\n")
+# Size of the text that is read at once [bytes].
+BLOCK = 2**22
+# In a number of decimal signs of a line: not a regular row.
+NO_SIGNS = 2**16 - 1
+
 Numbers = NDArray[np.int_]
 
 
+class Lines(Sequence[str]):
+    """The lines of a text in UTF-8, decoded when they are asked for."""
+
+    def __init__(self, text: bytes) -> None:
+        self.bytes = np.frombuffer(text, np.uint8)
+        blocks = range(0, len(text), BLOCK)
+        breaks = [np.flatnonzero(self.bytes[at : at + BLOCK] == NEWLINE) + at for at in blocks]
+        self.ends: Numbers = np.concatenate([*breaks, [len(text)]])
+        """Place of the line break after each line, and of the end of the text."""
+
+    def __len__(self) -> int:
+        return len(self.ends)
+
+    def start(self, index: int) -> int:
+        """Place of the first byte of a line."""
+        return int(self.ends[index - 1]) + 1 if index > 0 else 0
+
+    @overload
+    def __getitem__(self, index: int) -> str: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> list[str]: ...
+
+    def __getitem__(self, index: int | slice) -> str | list[str]:
+        if isinstance(index, slice):
+            return [self[one] for one in range(*index.indices(len(self)))]
+        index = range(len(self))[index]
+        return self.bytes[self.start(index) : self.ends[index]].tobytes().decode()
+
+
 def read_text(
-    path: Path, text: str, *, decimal: str | None = None, has_headers: bool = False
+    path: Path, text: bytes, *, decimal: str | None = None, has_headers: bool = False
 ) -> Table:
-    """Read a text; see `mesoslip.measured.reading.file.read_file`."""
-    lines = text.split("\n")
+    """Read a text in UTF-8; see `mesoslip.measured.reading.file.read_file`."""
+    lines = Lines(text)
     layout = find_layout(path, lines, decimal, has_headers=has_headers)
     if layout.delimiter != "," and layout.decimal == "," and decimal is None:
         check_decimal_comma(path, lines, layout)
-    body = _Body(path, lines, layout, is_ended=text.endswith("\n"))
+    body = _Body(path, lines, layout, is_ended=text.endswith(b"\n"))
     values, numbers = body.read()
     units = layout.units or ()
     return Table(
@@ -68,7 +106,7 @@ class _Body:
     """The rows of a text, and numbers of notable lines."""
 
     path: Path
-    lines: Sequence[str]
+    lines: Lines
     layout: Layout
     is_ended: bool
     bad: dict[int, list[BadCell]] = field(default_factory=dict)
@@ -86,22 +124,46 @@ class _Body:
         layout = self.layout
         # Lines above the numbers may be repeated.
         self.above = {line.strip() for line in self.lines[: layout.first]}
-        data = np.frombuffer("\n".join(self.lines[layout.first :]).encode() + b"\n", np.uint8)
-        ends = np.flatnonzero(data == ord("\n"))
-        starts = np.concatenate([[0], ends[:-1] + 1])
-        is_regular = self._regular(data, starts, ends)
-        values = np.full((layout.count, len(starts)), np.nan)
-        if is_regular.any():
-            values[:, is_regular] = self._fast(data, starts, ends, is_regular)
-        is_row = is_regular.copy()
-        for at in np.flatnonzero(~is_regular):
-            row = self._cells(int(at) + layout.first)
-            if row is not None:
-                values[:, at], is_row[at] = row, True
+        count = len(self.lines) - layout.first
+        values = np.full((layout.count, count), np.nan)
+        is_row = np.zeros(count, dtype=bool)
+        signs = np.full(count, NO_SIGNS, dtype=np.uint16)
+        at = 0
+        while at < count:
+            # A block ends with a line.
+            place = self.lines.start(layout.first + at) + BLOCK
+            to = max(at + 1, int(np.searchsorted(self.lines.ends, place)) - layout.first)
+            self._read_block(slice(at, to), values, is_row, signs)
+            at = to
+        self._find_odd(signs)
         self._check_short(int(is_row.sum()))
         self._cut_off(is_row)
         kept = np.flatnonzero(is_row)
+        if kept.size and kept[-1] == kept.size - 1:
+            return values[:, : kept.size], kept + layout.first + 1
         return values[:, kept], kept + layout.first + 1
+
+    def _read_block(
+        self, block: slice, values: Array, is_row: NDArray[np.bool], signs: NDArray[np.uint16]
+    ) -> None:
+        """Read some lines: their numbers, which of them are rows, and their decimal signs."""
+        first = self.layout.first + block.start
+        start = self.lines.start(first)
+        ends = self.lines.ends[first : self.layout.first + block.stop] - start
+        data = self.lines.bytes[start : start + ends[-1] + 1]
+        if len(data) == ends[-1]:
+            data = np.append(data, np.uint8(NEWLINE))
+        starts = np.concatenate([[0], ends[:-1] + 1])
+        is_regular = self._regular(data, starts, ends)
+        points = _counts(data == ord(self.layout.decimal), ends)
+        signs[block][is_regular] = np.minimum(points[is_regular], NO_SIGNS - 1)
+        if is_regular.any():
+            values[:, block][:, is_regular] = self._fast(data, starts, ends, is_regular, first)
+        is_row[block] = is_regular
+        for at in np.flatnonzero(~is_regular):
+            row = self._cells(int(at) + first)
+            if row is not None:
+                values[:, block.start + at], is_row[block.start + at] = row, True
 
     def _regular(self, data: NDArray[np.uint8], starts: Numbers, ends: Numbers) -> NDArray[np.bool]:
         """Whether lines have the usual number of cells and only characters of numbers."""
@@ -115,7 +177,7 @@ class _Body:
         has_strange = np.zeros(len(starts), dtype=bool)
         has_strange[np.searchsorted(ends, strange)] = True
         if layout.delimiter == " ":
-            is_blank = (data == ord(" ")) | (data == ord("\t")) | (data == ord("\n"))
+            is_blank = (data == ord(" ")) | (data == ord("\t")) | (data == NEWLINE)
             begins = ~is_blank
             begins[1:] &= is_blank[:-1]
             count = _counts(begins, ends)
@@ -124,17 +186,15 @@ class _Body:
         if layout.count == 1:
             count[ends == starts] = 0
         regular: NDArray[np.bool] = (count == layout.count) & ~has_strange
-        self._find_odd(data, ends, regular)
         return regular
 
-    def _find_odd(self, data: NDArray[np.uint8], ends: Numbers, regular: NDArray[np.bool]) -> None:
+    def _find_odd(self, signs: NDArray[np.uint16]) -> None:
         """Find rare rows with fewer decimal signs than all others."""
-        if not regular.any():
+        regular = np.flatnonzero(signs != NO_SIGNS)
+        if not regular.size:
             return
-        points = _counts(data == ord(self.layout.decimal), ends)[regular]
-        usual = int(points.max())
-        odd = np.flatnonzero(regular)[points < usual]
-        if 0 < len(odd) <= max(1, MAX_ODD * len(points)):
+        odd = regular[signs[regular] < signs[regular].max()]
+        if 0 < len(odd) <= max(1, MAX_ODD * len(regular)):
             self.odd = [int(one) + self.layout.first + 1 for one in odd]
 
     def _fast(
@@ -143,8 +203,10 @@ class _Body:
         starts: Numbers,
         ends: Numbers,
         is_regular: NDArray[np.bool],
+        first: int,
     ) -> Array:
-        """Numbers of regular lines, shape (columns, lines)."""
+        """Numbers of regular lines of a block, whose first line has an index; shape (columns,
+        lines)."""
         import pandas as pd
 
         layout = self.layout
@@ -170,12 +232,12 @@ class _Body:
         except ValueError:
             values = np.full((layout.count, 0), np.nan)
         if values.shape[1] != is_regular.sum() or np.isinf(values).any():
-            return self._slow(np.flatnonzero(is_regular))
+            return self._slow(np.flatnonzero(is_regular) + first)
         return values
 
     def _slow(self, indices: Numbers) -> Array:
         """Numbers of regular lines in which a cell, such as "1-5", is not a number."""
-        rows = [self._cells(int(one) + self.layout.first) for one in indices]
+        rows = [self._cells(int(one)) for one in indices]
         none = [math.nan] * self.layout.count
         return np.array([none if row is None else row for row in rows]).T
 

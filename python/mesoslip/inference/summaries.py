@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip.analysis.power_spectrum import power_spectrum
-from mesoslip.analysis.sampled_slips import FoundSlips, find_slips
+from mesoslip.analysis.sampled_slips import FoundSlips
+from mesoslip.analysis.strokes import Piece, find_slips_between_reversals
 from mesoslip.inference.features import (
     BANDS,
     CREEP_LAGS,
@@ -61,6 +62,8 @@ class Summarizer:
     """Sign of the drive's velocity."""
     has_start: bool = True
     """Whether the trace begins with the first loading of the run."""
+    pieces: tuple[Piece, ...] | None = None
+    """Pieces of a drive that goes back and forth, the same for every trace."""
 
     @cached_property
     def features(self) -> tuple[Feature, ...]:
@@ -98,8 +101,13 @@ class Summarizer:
 
     def slips(self, force: Array) -> FoundSlips:
         """The slips of a trace."""
-        return find_slips(
-            self.time, force, noise=self.noise, period=self.period, direction=self.direction
+        return find_slips_between_reversals(
+            self.pieces,
+            self.time,
+            force,
+            noise=self.noise,
+            period=self.period,
+            direction=self.direction,
         )
 
     def __call__(self, force: Array) -> Array:

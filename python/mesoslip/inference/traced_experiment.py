@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from mesoslip.analysis.apparatus import first_velocity
 from mesoslip.analysis.even_traces import INTERVAL_TOLERANCE
 from mesoslip.analysis.sampled_slips import estimated_period
+from mesoslip.analysis.strokes import Piece, monotone_pieces
 from mesoslip.configuration.config import Config
 from mesoslip.errors import ConfigError, FileError, RunError
 from mesoslip.execution.stop import StoppedError, StopRequest
@@ -235,6 +236,7 @@ def prepare(tree: xr.DataTree, plan: Plan, name: str = "", number: int = 0) -> E
         scale,
         math.copysign(1.0, velocity),
         plan.after < interval / 2 and not is_midway,
+        _pieces(root, is_known, sampling),
     )
     length = math.nan
     if WANDER in plan.prior.keys:
@@ -250,6 +252,16 @@ def prepare(tree: xr.DataTree, plan: Plan, name: str = "", number: int = 0) -> E
         Apparatus(declared),
         corrections,
     )
+
+
+def _pieces(
+    root: xr.Dataset, is_known: NDArray[np.bool_], sampling: Sampling
+) -> tuple[Piece, ...] | None:
+    """Pieces of a recorded drive that goes back and forth, as samples of the reduced trace."""
+    if "drive_displacement" not in root:
+        return None
+    drive = np.atleast_2d(root["drive_displacement"].values)[0].astype(float)[is_known]
+    return monotone_pieces(sampling.reduced(drive))
 
 
 def _is_loaded(force: Array, scale: float) -> bool:

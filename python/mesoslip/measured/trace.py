@@ -15,7 +15,13 @@ from numpy.typing import NDArray
 
 from mesoslip.analysis.apparatus import first_velocity
 from mesoslip.analysis.noise import TraceNoise, estimate_noise
-from mesoslip.analysis.sampled_slips import FoundSlips, find_slips
+from mesoslip.analysis.sampled_slips import FoundSlips
+from mesoslip.analysis.strokes import (
+    back_and_forth,
+    find_slips_between_reversals,
+    monotone_pieces,
+    record_pieces,
+)
 from mesoslip.configuration.config import Config
 from mesoslip.configuration.reading import PathLike, as_path
 from mesoslip.errors import ConfigError, Problem
@@ -265,8 +271,13 @@ def trace_of(understood: Understood) -> xr.DataTree:
         # Impulses and hum are no motion.
         cleaned = noise.clean(record.time, record.force)
         smooth = _displacement(record, cleaned, drive, stiffness)
+    pieces, cut_by = record_pieces(record.time, record.force, drive, record.displacement)
+    if pieces is not None:
+        # Only its size is known, as the drive goes back and forth.
+        velocity = None if drive is None else _mean_speed(record.time, drive)
     direction = -1.0 if velocity is not None and velocity < 0 else 1.0
-    found = find_slips(
+    found = find_slips_between_reversals(
+        pieces,
         record.time,
         record.force,
         noise=noise,
@@ -276,7 +287,12 @@ def trace_of(understood: Understood) -> xr.DataTree:
         loading_rate=loading_rate,
     )
     level = noise.deviation if isinstance(noise, TraceNoise) else noise
-    comment = "; ".join(_comments(direction * record.force, level, found.period))
+    comments = (
+        _comments(direction * record.force, level, found.period)
+        if pieces is None
+        else [back_and_forth(len(pieces), cut_by)]
+    )
+    comment = "; ".join(comments)
     details = {
         "origin": "measured",
         "measured_file": understood.path.name,
@@ -310,6 +326,14 @@ def _comments(force: Array, noise: float, period: float) -> Iterator[str]:
         )
     if not math.isfinite(period):
         yield "no slips stand out of the noise, so the period of the setup is unknown"
+
+
+def _mean_speed(time: Array, drive: Array) -> float:
+    """Mean speed of a drive that goes back and forth [m/s]."""
+    known = np.flatnonzero(np.isfinite(drive))
+    pieces = monotone_pieces(drive[known]) or ()
+    path = sum(abs(float(drive[known[one.after - 1]] - drive[known[one.first]])) for one in pieces)
+    return path / float(time[known[-1]] - time[known[0]])
 
 
 def _as_measured(config: Config, record: Record, title: str) -> Config:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,8 +15,9 @@ from mesoslip.analysis.noise import noise_level, without_impulses
 from mesoslip.analysis.regime.events import MIN_CYCLES, NO_SLIPS, Slips
 from mesoslip.analysis.regime.result import NAMES, REGIME, SMOOTH, TRANSIENT, RegimeResult
 from mesoslip.analysis.regime.rules import classify
-from mesoslip.analysis.regime.scales import Scales, measured_stage, stage_of
-from mesoslip.output.access import group_of
+from mesoslip.analysis.regime.scales import Scales, Stage, measured_stage, stage_of
+from mesoslip.analysis.strokes import Piece, output_pieces, sliding_of
+from mesoslip.output.access import group_of, is_measured
 from mesoslip.output.arrays import Tree
 from mesoslip.output.inputs import OutputLike, opened_run
 from mesoslip.simulation.recorded_tables import SLIP_COLUMNS, TRACE_COLUMNS
@@ -62,8 +64,11 @@ def judge(tree: Tree, name: str = "the output") -> tuple[list[RegimeResult], str
     for number in range(root.sizes["realization"]):
         mine = owner == number
         own = Slips(slips.start[mine], slips.before[mine], slips.drop[mine])
-        window = _window(tree, number, apparatus)
-        results.append(classify(*window, own))
+        pieces = output_pieces(tree, number)[0] if is_measured(tree) else None
+        if pieces is None:
+            results.append(classify(*_window(tree, number, apparatus), own))
+        else:
+            results.append(_in_strokes(tree, number, apparatus, own, pieces))
     config = apparatus.config
     if config is None or not config.drive.is_force or config.slider.jumps:
         return results, None
@@ -110,6 +115,38 @@ def _window(tree: Tree, number: int, apparatus: Apparatus) -> tuple[Scales, Arra
     time, force, velocity = _even(time, force, velocity)
     scales = Scales.of_measurement(apparatus, stage, force, noise_level(force))
     return scales, time, force, velocity
+
+
+def _in_strokes(
+    tree: Tree, number: int, apparatus: Apparatus, slips: Slips, pieces: Sequence[Piece]
+) -> RegimeResult:
+    """The regime of a measured trace in strokes, from the sliding in its second half.
+
+    The parts between reversals are put one after the other, in time too, with forces along the
+    motion. Without slips they are smooth, however the friction depends on the position.
+    """
+    root = tree.to_dataset()
+    time, force = root["time"].values, root[apparatus.force_name][number].values
+    sliding = sliding_of(force, pieces)
+    inside = time[sliding.samples] >= (time[0] + time[-1]) / 2
+    samples, along = sliding.samples[inside], sliding.aligned()[inside]
+    if samples.size < 2 * MIN_CYCLES:
+        return RegimeResult()
+    # Joints are as long as an interval.
+    steps = np.diff(time[samples], prepend=time[samples[0]])
+    steps[1:][np.diff(samples) > 1] = float(np.median(np.diff(time)))
+    glued = time[samples[0]] + np.cumsum(steps)
+    at = np.searchsorted(time[samples], slips.start)
+    kept = np.isin(slips.start, time[samples])
+    sign = sliding.sign[inside][at[kept]]
+    own = Slips(glued[at[kept]], sign * slips.before[kept], slips.drop[kept])
+    stage = Stage(float(glued[0]), float(glued[-1]), 1.0)
+    glued, along = _even(glued, along)
+    scales = Scales.of_measurement(apparatus, stage, along, noise_level(along))
+    # The velocity is not that of one motion.
+    scales = replace(scales, has_velocity=False)
+    found = classify(scales, glued, along, np.full(along.size, np.nan), own)
+    return found if len(own) else replace(found, regime=SMOOTH)
 
 
 def _even(time: Array, *values: Array) -> tuple[Array, ...]:

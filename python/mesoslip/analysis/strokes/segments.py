@@ -1,0 +1,230 @@
+"""The monotone pieces of a record that goes back and forth, from reversal to reversal.
+
+A reversal is an extreme of the displacement, between swings that stand out of its noise. Where the
+displacement is at rest there, the reversal is in the middle of the rest. Without a displacement,
+pieces are guessed from the sign of the force: it stays at one level while the drive moves in one
+direction.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mesoslip.analysis.alternating_extremes import Extremes, Samples, extremes_of
+from mesoslip.analysis.noise import noise_level
+from mesoslip.output.arrays import Tree
+from mesoslip.output.variables import FORCES
+
+Array = NDArray[np.float64]
+
+# Name of the quantity by which strokes are guessed.
+FORCE = "sign of the force"
+# Minimum range of the noise over that of the displacement, where it has no noise.
+MIN_RANGE = 1e-5
+# Minimum number of swings above a gap of their sizes, and minimum size of a swing over the median.
+MIN_SWINGS, MIN_SWING = 3, 0.1
+# The same of a swing at either end of the record.
+MIN_END = 0.01
+# Minimum path backwards over that forwards: less is play or noise of one motion.
+MIN_BACK = 0.05
+# Maximum distance from an extreme at which the displacement rests, over the swing.
+REST = 0.002
+# The force without a displacement: quantiles that are its levels, minimum ratio of the smaller to
+# the larger, and part of the distance from their middle to them that a change of sign exceeds.
+LEVELS, MIN_RATIO, BEYOND = (0.1, 0.9), 0.1, 0.5
+# Maximum ratio of the times of rises and falls, minimum share of the time at the levels, and
+# minimum number of changes of the sign.
+MAX_ASYMMETRY, MIN_SHARE, MIN_CHANGES = 4.0, 0.45, 4
+
+
+class Piece(NamedTuple):
+    """Samples ``first`` to ``after - 1``, in which the drive moves in one direction, +1 or -1."""
+
+    first: int
+    after: int
+    direction: int
+
+    @property
+    def samples(self) -> slice:
+        """The samples of the piece."""
+        return slice(self.first, self.after)
+
+    @property
+    def size(self) -> int:
+        """The number of samples."""
+        return self.after - self.first
+
+
+def record_pieces(
+    time: Array, force: Array, drive: Array | None, displacement: Array | None = None
+) -> tuple[tuple[Piece, ...] | None, str]:
+    """Pieces of a record, and the quantity in which they were found.
+
+    That is the load point, or else the displacement of the slider, or else the sign of the force,
+    which is a guess. The pieces are None if the record does not go back and forth.
+    """
+    for values, name in ((drive, "load point"), (displacement, "displacement of the slider")):
+        if values is not None and np.isfinite(values).any():
+            return monotone_pieces(values), name
+    return pieces_of_force(time, force), FORCE
+
+
+def output_pieces(tree: Tree, realization: int = 0) -> tuple[tuple[Piece, ...] | None, str]:
+    """Pieces of a realization of an output, and the quantity in which they were found."""
+    root = tree.to_dataset()
+    force = root[next(one for one in FORCES if one in root)].values[realization]
+    drive, displacement = (
+        root[one].values[realization] if one in root else None
+        for one in ("drive_displacement", "displacement")
+    )
+    # Forces are missing after the end of an interrupted run only.
+    known = np.isfinite(force)
+    return record_pieces(root["time"].values[known], force[known], drive, displacement)
+
+
+def back_and_forth(count: int, name: str) -> str:
+    """A sentence about a record that was cut by a quantity into a number of pieces."""
+    text = f"goes back and forth, with {count - 1} reversals; slips are those between them"
+    if name != FORCE:
+        return text
+    return (
+        f"guess, by the {name}: {text}; give the velocity of the drive if it moves in one direction"
+    )
+
+
+def monotone_pieces(displacement: Array) -> tuple[Piece, ...] | None:
+    """Pieces of a displacement between its reversals; None if it does not go back and forth.
+
+    The first and the last piece may be parts of strokes. Missing samples (NaN) belong to the piece
+    around them.
+    """
+    known = np.flatnonzero(np.isfinite(displacement))
+    if known.size < 4:
+        return None
+    values = displacement[known] - displacement[known[0]]
+    noise = _range_of_noise(values)
+    extremes = extremes_of(values)
+    threshold = _min_swing(values, extremes, noise)
+    if threshold is None:
+        return None
+    tops, bottoms = extremes.falls(threshold)
+    at = np.sort(np.concatenate([tops, bottoms]))
+    at = _with_ends(values, at, max(noise, MIN_END / MIN_SWING * threshold))
+    if at.size == 0:
+        return None
+    swings = np.diff(values[[0, *at, -1]])
+    paths = sorted(np.abs(swings[number::2]).sum() for number in range(2))
+    if paths[0] < MIN_BACK * paths[1]:
+        return None
+    typical = float(np.median(np.abs(swings)))
+    near = max(noise, REST * typical)
+    bounds = [_middle_of_rest(values, int(one), near) for one in at]
+    ends = [0, *known[bounds].tolist(), displacement.size]
+    first = 1 if values[at[0]] > values[0] else -1
+    return tuple(
+        Piece(begin, end, first * (-1) ** number)
+        for number, (begin, end) in enumerate(pairwise(ends))
+    )
+
+
+def pieces_of_force(time: Array, force: Array) -> tuple[Piece, ...] | None:
+    """Pieces guessed from the sign of a force; None if it does not look like friction in strokes.
+
+    The force has levels of opposite signs, at which it is most of the time, and passes from one to
+    the other about as fast as back. Slips fall faster than the force rises.
+    """
+    if force.size < 4 * MIN_CHANGES:
+        return None
+    low, high = (float(one) for one in np.quantile(force, LEVELS))
+    if not low < 0 < high or min(-low, high) < MIN_RATIO * max(-low, high):
+        return None
+    middle, half = (low + high) / 2, (high - low) / 2
+    if 2 * half * (1 - BEYOND) < _range_of_noise(force) / 2:
+        return None
+    side = np.where(force > middle + BEYOND * half, 1, 0)
+    side[force < middle - BEYOND * half] = -1
+    beyond = np.flatnonzero(side)
+    change = np.flatnonzero(np.diff(side[beyond]))
+    if change.size < MIN_CHANGES or beyond.size < MIN_SHARE * force.size:
+        return None
+    last, next_one = beyond[change], beyond[change + 1]
+    took = time[next_one] - time[last]
+    rising = side[next_one] > 0
+    rise, fall = float(np.median(took[rising])), float(np.median(took[~rising]))
+    if not 1 / MAX_ASYMMETRY <= rise / fall <= MAX_ASYMMETRY:
+        return None
+    # The force begins to change its sign at the extreme before it is beyond the level.
+    bounds: list[int] = []
+    for number, (one, two) in enumerate(zip(last.tolist(), next_one.tolist(), strict=True)):
+        start = max(bounds[-1] + 1 if bounds else 0, one - (two - one))
+        before = side[one] * force[start : one + 1]
+        bounds.append(start + int(np.argmax(before)) if number or start else one)
+    ends = [0, *bounds, force.size]
+    first = int(side[last[0]])
+    return tuple(
+        Piece(begin, end, first * (-1) ** number)
+        for number, (begin, end) in enumerate(pairwise(ends))
+    )
+
+
+def _range_of_noise(values: Array) -> float:
+    """Range that the noise of a record hardly exceeds."""
+    level = noise_level(values)
+    return max(
+        (2 * math.sqrt(2 * math.log(values.size)) + 1) * level, MIN_RANGE * float(np.ptp(values))
+    )
+
+
+def _min_swing(values: Array, extremes: Extremes, noise: float) -> float | None:
+    """Minimum size of a swing that is a stroke; None without swings above the noise.
+
+    It is at the widest gap of the sizes on a logarithmic scale, from the noise on: vibrations and
+    play of the drive are far smaller than its strokes.
+    """
+    sizes = np.concatenate([extremes.fall_sizes, extremes_of(-values).fall_sizes])
+    sizes = np.sort(sizes[sizes > noise])
+    if sizes.size == 0 or noise == 0:
+        return None
+    lower = np.concatenate([[noise], sizes[:-1]])[: max(1, sizes.size - MIN_SWINGS + 1)]
+    widest = int(np.argmax(sizes[: lower.size] / lower))
+    return max(float(lower[widest]), MIN_SWING * float(np.median(sizes[widest:])))
+
+
+def _with_ends(values: Array, at: Samples, min_size: float) -> Samples:
+    """Extremes without a first and last one at which the record begins and ends, and with those of
+    short swings there. The first one is a maximum, the last one a minimum."""
+    if at.size == 0:
+        return at
+    start = _at_start(values[: at[0] + 1], min_size)
+    end = values.size - 1 - _at_start(-values[at[-1] :][::-1], min_size)
+    return np.concatenate([start, at[1:-1], end[::-1]])
+
+
+def _at_start(values: Array, min_size: float) -> Samples:
+    """The extremes of the start of a record that ends with a maximum."""
+    top = values.size - 1
+    bottom = int(np.argmin(values))
+    if values[top] - values[bottom] <= min_size:
+        return np.empty(0, dtype=int)
+    first = int(np.argmax(values[: bottom + 1]))
+    return np.array([bottom, top] if values[first] - values[bottom] > min_size else [top])
+
+
+def _middle_of_rest(values: Array, at: int, near: float) -> int:
+    """Middle of the samples around an extreme that are near its value."""
+    window = 16
+    while True:
+        first, after = max(0, at - window), min(values.size, at + window + 1)
+        away = np.flatnonzero(np.abs(values[first:after] - values[at]) > near) + first
+        before, behind = away[away < at], away[away > at]
+        is_left, is_right = before.size > 0 or first == 0, behind.size > 0 or after == values.size
+        if is_left and is_right:
+            left = int(before[-1]) + 1 if before.size else 0
+            right = int(behind[0]) - 1 if behind.size else values.size - 1
+            return (left + right + 1) // 2
+        window *= 4

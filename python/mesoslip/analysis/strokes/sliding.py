@@ -1,0 +1,112 @@
+"""The sliding parts of a record that goes back and forth, put one after the other.
+
+A sliding part is from where the force reaches its level after a reversal to the next reversal, with
+the force along the motion. So a record in strokes becomes one as of a drive in one direction,
+without the changes of sign at reversals.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mesoslip.analysis.strokes.segments import Piece
+
+Array = NDArray[np.float64]
+
+# Share of a piece, in its middle, whose median is the level at which sliding begins.
+MIDDLE = 0.8
+# Minimum number of samples of a sliding part.
+MIN_SAMPLES = 5
+
+
+@dataclass(frozen=True)
+class Sliding:
+    """The sliding parts of a record, one after the other, each array of shape (samples,)."""
+
+    samples: NDArray[np.int_]
+    """Samples of the record."""
+    piece: NDArray[np.int_]
+    """Number of the piece."""
+    sign: Array
+    """Sign of the force along the motion in the record."""
+    force: Array
+    """Force along the motion."""
+
+    @property
+    def parts(self) -> Iterator[slice]:
+        """The samples of each part."""
+        ends = np.flatnonzero(np.diff(self.piece, append=-1)) + 1
+        start = 0
+        for end in ends.tolist():
+            yield slice(start, end)
+            start = end
+
+    @cached_property
+    def trend(self) -> Array:
+        """Mean growth of the force in a part, about the middle of each part.
+
+        Put one after the other, strokes in which the force grows would be a sawtooth.
+        """
+        rates = []
+        since = np.empty(self.force.size)
+        for one in self.parts:
+            values = self.force[one]
+            tenth = max(1, values.size // 10)
+            growth = np.median(values[-tenth:]) - np.median(values[:tenth])
+            rates.append(growth / values.size)
+            since[one] = np.arange(values.size) - (values.size - 1) / 2
+        # Partial strokes at the ends have other rates.
+        return max(float(np.median(rates)), 0.0) * since if rates else since
+
+    def unfolded(self) -> Array:
+        """The force without trend and without steps from part to part."""
+        force = self.force - self.trend
+        level = float(force[0]) if force.size else 0.0
+        for one in self.parts:
+            force[one] += level - force[one.start]
+            level = float(force[one.stop - 1])
+        return force
+
+    def aligned(self) -> Array:
+        """The force without trend, each part about the mean of all."""
+        force = self.force - self.trend
+        mean = float(self.force.mean()) if self.force.size else 0.0
+        for one in self.parts:
+            force[one] += mean - float(np.median(force[one]))
+        return force
+
+
+def sliding_of(force: Array, pieces: Sequence[Piece]) -> Sliding:
+    """The sliding parts of a record that goes back and forth."""
+    pole = polarity(force, pieces)
+    samples, numbers, signs = [np.empty(0, dtype=int)], [], []
+    for number, one in enumerate(pieces):
+        along = pole * one.direction * force[one.samples]
+        start = int(np.argmax(along >= np.median(along[_middle(one.size)])))
+        if one.size - start >= MIN_SAMPLES:
+            samples.append(np.arange(one.first + start, one.after))
+            numbers += [number] * (one.size - start)
+            signs += [pole * one.direction] * (one.size - start)
+    at, sign = np.concatenate(samples), np.array(signs, dtype=float)
+    return Sliding(at, np.array(numbers, dtype=int), sign, sign * force[at])
+
+
+def polarity(force: Array, pieces: Sequence[Piece]) -> float:
+    """+1 if the force of a record is along the motion in the middle of the pieces, or else -1."""
+    # The first and the last may be parts of strokes.
+    whole = pieces[1:-1] if len(pieces) > 3 else pieces
+    means = np.array([np.mean(force[one.samples][_middle(one.size)]) for one in whole])
+    forwards = np.array([one.direction for one in whole]) > 0
+    # The difference is free of an offset of the force.
+    return -1.0 if means[forwards].mean() < means[~forwards].mean() else 1.0
+
+
+def _middle(size: int) -> slice:
+    """The middle of a number of samples."""
+    edge = int(size * (1 - MIDDLE) / 2)
+    return slice(edge, size - edge)

@@ -235,7 +235,9 @@ def _lives(config: Config) -> str:
     if not contacts.reattach:
         return "A contact that reaches its threshold breaks for good."
     drag = ""
-    if contacts.drag_rate and not config.slider.ignores_delay:
+    if contacts.drag and not config.slider.ignores_delay:
+        drag = f"is dragged (all together: Nmη = {quantity(contacts.drag, 'N s/m')}), "
+    elif contacts.drag_rate and not config.slider.ignores_delay:
         drag = f"is dragged at the rate η = {quantity(contacts.drag_rate, '1/s')}, "
     wait = "at once"
     if contacts.delay and not config.slider.ignores_delay:

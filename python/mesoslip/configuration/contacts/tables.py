@@ -17,6 +17,7 @@ from mesoslip.configuration.table import (
     Complaint,
     Complaints,
     Density,
+    Drag,
     Force,
     Length,
     Number,
@@ -316,6 +317,9 @@ class Contacts(Table):
     drag_rate: Annotated[Rate, Field(ge=0)] = 0.0
     """Rate η of the drag m η V of a detached contact; needs area, film_thickness and
     film_density."""
+    drag: Annotated[Drag, Field(ge=0)] = 0.0
+    """Drag of all contacts together over the velocity, if all were detached, N m η; in place of
+    `drag_rate` where no film is known."""
     delay: Annotated[Time, Field(ge=0)] = 0.0
     """Time between detaching and attaching again, τ_d."""
     delay_law: Annotated[str, choice(DELAY_LAWS)] = "fixed"
@@ -364,6 +368,12 @@ class Contacts(Table):
 
     @model_validator(mode="after")
     def _mass_for_drag(self) -> Self:
+        if self.drag_rate > 0 and self.drag > 0:
+            raise problem(
+                "drag",
+                "give either drag or drag_rate (0 or left out): both determine the drag of "
+                "detached contacts",
+            )
         if self.drag_rate > 0:
             for key in ("area", "film_thickness", "film_density"):
                 if getattr(self, key) is None:
@@ -430,7 +440,7 @@ class Contacts(Table):
     @property
     def contact_drag(self) -> float:
         """m η [N s/m]."""
-        return self.contact_mass * self.drag_rate
+        return self.drag / self.count if self.drag > 0 else self.contact_mass * self.drag_rate
 
     @property
     def stretch_width(self) -> float:

@@ -1004,7 +1004,6 @@ def test_what_the_kernel_is_reported_of_contacts(klein):
     kind = config.contact_kind
     assert (kind.kernel_kind, kind.is_discrete, kind.on_lattice) == ("populations", False, False)
     assert kind.kernel_parameters(config) == common | {"resolution": 0.25}
-    assert kind.max_realizations == 1
 
     # N m eta without a film
     given = 4080 * common["drag"].expected

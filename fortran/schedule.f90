@@ -13,6 +13,7 @@ module mesoslip_schedule
    use mesoslip_numerics_accumulator, only: accumulator_type
    use mesoslip_hazard, only: hazard_type
    use mesoslip_interface_law, only: clocks, interface_law_type, window_type
+   use mesoslip_track_strength, only: track_strength_type
    implicit none
    private
 
@@ -63,6 +64,10 @@ module mesoslip_schedule
          & attach_drag(max_events) = 0.0_wp
       !> Displacements of past attachments [m]
       real(wp) :: attach_displacement(max_events) = 0.0_wp
+      !> Strength along the track, which multiplies breaking stretches where contacts attach
+      type(track_strength_type) :: strength
+      !> Whether it multiplies first stretches too
+      logical :: scales_stretches = .false.
       !> Whether contacts that break may attach within the schedule; for each break the delay until
       !> then [s], the stiffness [N/m], the first stretch and that at breaking [m], and the deviate
       !> of the next life. Breaks by a clock are listed after the others.
@@ -108,7 +113,7 @@ module mesoslip_schedule
       procedure, non_overridable :: break_count
       !> Make the events that are due at a time and a displacement
       procedure, non_overridable :: pass
-      procedure, non_overridable, private :: break_due, attach_due, insert_attachment
+      procedure, non_overridable, private :: break_due, attach_due, insert_attachment, can_attach
       procedure, non_overridable, private :: pass_clocks, break_with_clocks, attach_with_clocks, &
          & change_sign, cut_lists, skip_gone
    end type schedule_type
@@ -269,6 +274,9 @@ contains
 
       do event = self%attached + 1, self%attachments
          if (self%attach_time(event) > time) exit
+         if (self%strength%is_used) then
+            if (.not. self%can_attach(event, displacement)) exit
+         end if
          self%attach_displacement(event) = displacement
          origin = displacement - self%attach_stretch(event)
          call self%drag%add(-self%attach_drag(event))
@@ -349,6 +357,26 @@ contains
       self%hazard%next(self%number) = self%clock_key(self%clock_broken + 1)
    end subroutine pass_clocks
 
+   !> Set the stretches of a contact that attaches at a displacement [m] by the strength there;
+   !> false if the contact is too weak there to attach, and has to be drawn again.
+   function can_attach(self, event, displacement)
+      class(schedule_type), intent(inout) :: self
+      integer, intent(in) :: event
+      real(wp), intent(in) :: displacement
+      logical :: can_attach
+
+      real(wp) :: factor, limit, stretch
+
+      factor = self%strength%factor(displacement)
+      limit = factor * self%attach_limit(event)
+      stretch = self%attach_stretch(event)
+      if (self%scales_stretches) stretch = factor * stretch
+      can_attach = abs(stretch) < limit
+      if (.not. can_attach) return
+      self%attach_limit(event) = limit
+      self%attach_stretch(event) = stretch
+   end function can_attach
+
    !> Break a contact.
    subroutine break_with_clocks(self, time, displacement, entry, origin)
       class(schedule_type), intent(inout) :: self
@@ -405,6 +433,9 @@ contains
 
       do event = self%attached + 1, self%attachments
          if (self%attach_time(event) > time) exit
+         if (self%strength%is_used) then
+            if (.not. self%can_attach(event, displacement)) exit
+         end if
          self%attach_displacement(event) = displacement
          origin = displacement - self%attach_stretch(event)
          call self%drag%add(-self%attach_drag(event))

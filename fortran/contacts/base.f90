@@ -15,6 +15,7 @@ module mesoslip_contacts_base
    use mesoslip_contacts_threshold_laws, only: make_threshold_law
    use mesoslip_contacts_threshold_laws_base, only: threshold_law_type
    use mesoslip_schedule, only: schedule_type
+   use mesoslip_track_strength, only: take_track_strength, track_strength_type
    implicit none
    private
 
@@ -51,7 +52,7 @@ module mesoslip_contacts_base
       !> Mean delay between detaching and attaching [s], and one of the delay_ codes
       real(wp) :: delay = 0.0_wp
       integer :: delay_law = delay_fixed
-      !> Backward force over mean static threshold, f_b/f_s
+      !> Backward force over mean static threshold, f_b/f_s; over the own one if it is kept
       real(wp) :: back_force_ratio = 0.0_wp
       !> Standard deviation of the force at attaching over the mean static threshold
       real(wp) :: newborn_width = 0.0_wp
@@ -59,6 +60,10 @@ module mesoslip_contacts_base
       integer :: coupling = coupling_scaled
       !> Whether a broken contact attaches again
       logical :: reattach = .true.
+      !> Whether a contact keeps the threshold that it drew first
+      logical :: keeps_thresholds = .false.
+      !> Strength along the track of the slider, which multiplies thresholds
+      type(track_strength_type) :: strength
       !> Law of the relative thresholds
       class(threshold_law_type), allocatable :: law
       !> Key of the random numbers
@@ -263,6 +268,9 @@ contains
       call archive%exchange("step_work", self%step_work)
       call archive%exchange("error_estimate", self%error_estimate)
       call archive%exchange("cost", self%cost)
+      if (self%parameters%strength%is_used) then
+         call archive%exchange("track_origin", self%parameters%strength%origin)
+      end if
    end subroutine exchange_contacts
 
    !> Take the parameters that all kinds of contacts have.
@@ -289,9 +297,15 @@ contains
       call parameters%take("newborn_width", self%newborn_width, error)
       call parameters%take("coupling", coupling_names, self%coupling, error)
       call parameters%take("reattach", self%reattach, error)
+      if (parameters%has("keeps_thresholds")) then
+         call parameters%take("keeps_thresholds", self%keeps_thresholds, error)
+      end if
+      call take_track_strength(self%strength, parameters, seed, realization, error)
       call parameters%take("threshold_law", law, error)
       if (allocated(error)) return
-      call make_threshold_law(self%law, law, parameters, self%back_force_ratio, error)
+      ! Below its own threshold the force at attaching rejects none.
+      call make_threshold_law(self%law, law, parameters, &
+         & merge(0.0_wp, self%back_force_ratio, self%keeps_thresholds), error)
       if (allocated(error)) return
       if (self%law%has_stiffnesses .neqv. self%coupling == coupling_table) then
          call raise(error, status_invalid, "stiffnesses of a table of thresholds are for the " &

@@ -66,7 +66,7 @@ contains
       ! A contact that attaches in backward motion starts with the back force against the direction.
       max_distance = common%static_force / common%stiffness &
          & * max(common%law%quantile(rare), 1.0_wp) * (1.0_wp + common%back_force_ratio &
-         & + far_newborn * common%newborn_width)
+         & + far_newborn * common%newborn_width) * common%strength%usual_max()
       call new_contact_queue(ensemble%queue, common%count, 1.1_wp * max_distance, error)
       call move_alloc(ensemble, contacts)
    end subroutine make_contact_ensemble
@@ -109,7 +109,7 @@ contains
 
       schedule%is_over = .true.
       schedule%at_bound = .false.
-      if (self%track%columns > 0) return
+      if (self%track%columns > 0 .or. .not. self%knows_lives()) return
       schedule%is_bounded = pose%direction * self%direction < 0.0_wp
       if (schedule%is_bounded) then
          call self%plan_back(min(limit, max_events, events_back), schedule)

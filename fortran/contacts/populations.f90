@@ -8,7 +8,7 @@ module mesoslip_contacts_populations
    use mesoslip_numerics_parameters, only: parameters_type
    use mesoslip_contacts_ageing_law, only: ageing_law_type, take_ageing_law
    use mesoslip_contacts_base, only: contact_parameters_type, contacts_type, exchange_contacts
-   use mesoslip_contacts_mechanics, only: coupling_equal
+   use mesoslip_contacts_mechanics, only: coupling_equal, coupling_table
    use mesoslip_contacts_populations_offer, only: offer_step
    use mesoslip_contacts_populations_packets, only: new_detached_packets
    use mesoslip_contacts_populations_pinned, only: new_pinned_populations
@@ -46,6 +46,11 @@ contains
 
       if (.not. resolution > 0.0_wp) then
          call raise(error, status_invalid, "the resolution of populations must be positive")
+         return
+      end if
+      if (parameters%strength%is_used .and. parameters%coupling == coupling_table) then
+         call raise(error, status_invalid, "populations with the stiffnesses of a table have the " &
+            & // "same strength everywhere")
          return
       end if
       self%parameters = parameters
@@ -96,9 +101,10 @@ contains
       type(error_type), allocatable, intent(inout) :: error
 
       if (.not. (rate > 0.0_wp .and. force > 0.0_wp &
-         & .and. self%parameters%coupling == coupling_equal)) then
-         call raise(error, status_invalid, "activation needs equal contacts, and a positive rate " &
-            & // "and force")
+         & .and. self%parameters%coupling == coupling_equal) &
+         & .or. self%parameters%strength%is_used) then
+         call raise(error, status_invalid, "activation of populations needs equal contacts, the " &
+            & // "same strength everywhere, and a positive rate and force")
          return
       end if
       call self%pinned%activate(rate, force / self%parameters%static_force, self%resolution)
@@ -109,6 +115,9 @@ contains
       class(contact_populations_type), intent(inout) :: self
       integer, intent(in) :: state
 
+      if (self%pinned%has_track) then
+         call self%pinned%sum_newborns(self%parameters%strength%factor(0.0_wp))
+      end if
       call self%pinned%initialize(state, self%failure)
    end subroutine initialize
 
@@ -132,6 +141,7 @@ contains
       class(contact_populations_type), intent(inout) :: self
       real(wp), intent(in) :: shift, displacement
 
+      self%parameters%strength%origin = self%parameters%strength%origin + shift
       call self%pinned%shift_origin(shift)
    end subroutine shift_origin
 
@@ -151,6 +161,7 @@ contains
       call exchange_contacts(self, archive)
       call self%pinned%exchange(archive)
       call self%detached%exchange(archive)
+      if (self%pinned%has_track) call archive%exchange("factor", self%pinned%factor)
       if (.not. self%pinned%is_thermal) return
       call archive%exchange("last_duration", self%last_duration)
       call archive%exchange("last_velocity", self%last_velocity)
@@ -161,6 +172,7 @@ contains
       class(contact_populations_type), intent(inout) :: self
       real(wp), intent(in) :: displacement
 
+      if (self%pinned%has_track) call self%pinned%sum_newborns(self%pinned%factor)
       call self%pinned%forget_trial()
    end subroutine rebuild
 

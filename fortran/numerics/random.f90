@@ -8,7 +8,7 @@ module mesoslip_numerics_random
    implicit none
    private
 
-   public :: philox4x32, uniform_pair, uniform_pairs
+   public :: philox4x32, philox_words, uniform_pair, uniform_pairs
 
    integer(i8), parameter :: mask = int(z'FFFFFFFF', i8)
    integer(i8), parameter :: multiplier_0 = int(z'D2511F53', i8)
@@ -59,12 +59,22 @@ contains
 
       integer(i8) :: word(0:3)
 
-      call philox4x32([contact, iand(renewal, mask), &
-         & ior(ishft(renewal, -32), ishft(attempt, 16)), realization], &
-         & [iand(seed, mask), ishft(seed, -32)], word)
+      call philox_words(seed, realization, contact, renewal, attempt, word)
       uniform(1) = unit_real(word(0), word(1))
       uniform(2) = unit_real(word(2), word(3))
    end subroutine uniform_pair
+
+   !> The random words from which the deviates of a birth are made.
+   pure subroutine philox_words(seed, realization, contact, renewal, attempt, word)
+      !> The key, as that of uniform_pair
+      integer(i8), intent(in) :: seed, realization, contact, renewal, attempt
+      !> Four random 32-bit words, each in the low half of an element
+      integer(i8), intent(out) :: word(0:3)
+
+      call philox4x32([contact, iand(renewal, mask), &
+         & ior(ishft(renewal, -32), ishft(attempt, 16)), realization], &
+         & [iand(seed, mask), ishft(seed, -32)], word)
+   end subroutine philox_words
 
    !> The pairs of several contacts at one attempt, to the same bits and in less time.
    pure subroutine uniform_pairs(seed, realization, contact, renewal, attempt, first, second)

@@ -161,3 +161,13 @@ def set_stop(
 ) -> tuple[int, bytes]: ...
 def start_simulation(handle: NDArray[np.int64], initial: str) -> tuple[int, bytes]: ...
 def sundials() -> bytes: ...
+def track_strength(
+    names: NDArray[np.bytes_],
+    values: NDArray[np.float64],
+    words: NDArray[np.bytes_],
+    seed: int,
+    realization: int,
+    displacement: NDArray[np.float64],
+    length: int = ...,
+    points: int = ...,
+) -> tuple[NDArray[np.float64], int, bytes]: ...

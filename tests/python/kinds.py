@@ -57,6 +57,10 @@ FORCE = {
     },
 }
 
+TRACK = {"contacts__track": {"spread": 0.3, "length": 2e-9, "correlation": "exponential"}}
+SMOOTH_TRACK = {"contacts__track": {"spread": 0.3, "length": 2e-9}}
+KEEP = {"contacts__renewal": "keep"}
+
 ME = {"run__engine": "me"}
 # Steps four times as long as by default, for master equations that take some tenths of a second.
 COARSE = ME | {"run__resolution": 1.0}
@@ -86,6 +90,24 @@ KINDS: dict[str, dict[str, Any]] = {
     "rigid, table, me": TABLE | ME,
     "rigid, stiffnesses": STIFFNESSES | NEWBORN,
     "rigid, stiffnesses, me": STIFFNESSES | ME,
+    "rigid, track": TRACK,
+    "rigid, keep, exponential delays": KEEP | RANDOM,
+    "rigid, track, keep, newborn width": TRACK | KEEP | NEWBORN,
+    "rigid, track, stiffnesses": SMOOTH_TRACK | STIFFNESSES,
+    "rigid, track, me, newborn width": SMOOTH_TRACK | NEWBORN | COARSE,
+    "rigid, ageing, track": TRACK | AGEING,
+    "prescribed, ageing, track, me": TRACK
+    | AGEING
+    | {"run__engine": "me", "slider": {"kind": "prescribed"}},
+    "rigid, thermal, track": TRACK | THERMAL,
+    "prescribed, thermal, ageing, track": TRACK
+    | AGEING
+    | THERMAL
+    | {"slider": {"kind": "prescribed"}},
+    "quasistatic, lattice, track, keep": TRACK
+    | KEEP
+    | SNAPSHOTS
+    | {"slider": {"kind": "quasistatic", "stiffness": 97.0}, "run__avalanches": 500},
     "rigid, lattice": SNAPSHOTS,
     "rigid, lattice, no delay": SNAPSHOTS | {"contacts__delay": 0.0},
     "rigid, me": ME,

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from mesoslip import Config, _core
+from mesoslip.configuration.kernel_parameters import named
 from scipy import integrate, linalg, optimize, special, stats
 
 
@@ -45,6 +46,14 @@ def uniforms(
         (((high << 20) | (low >> 12)) + 0.5) * 2.0**-52
         for low, high in ((words[0], words[1]), (words[2], words[3]))
     )
+
+
+def relative_strength(track, seed: int, realization: int, x) -> np.ndarray:
+    """The Gaussian function of a track, as the kernel has it."""
+    parameters = named(track.kernel_parameters(0.05))
+    values, status, message = _core.track_strength(*parameters, seed, realization, np.asarray(x))
+    assert status == 0, message
+    return values
 
 
 def stationary_force(config: Config, velocity: float = 0.0) -> float:
@@ -96,6 +105,7 @@ class Contacts:
         self.origin = np.zeros(count)
         self.due = np.full(count, np.nan)
         self.u = np.array([self.draw(contact) for contact in range(count)])
+        self.factor = np.full(count, self.strength(0.0))
         self.direction = 1.0
         self.time = 0.0
         self.birth = np.full(count, 0.0)
@@ -111,7 +121,18 @@ class Contacts:
         self.avalanches: list[tuple[float, list[int]]] = []
         self.order: list[int] = []
 
+    def strength(self, x: float) -> float:
+        """Factor of the thresholds of contacts that attach at x on the track."""
+        track = self.config.contacts.track
+        if track is None:
+            return 1.0
+        g = relative_strength(track, self.config.run.seed, self.realization, [x])[0]
+        return max(0.05, 1 + track.spread * g)
+
     def draw(self, contact: int) -> float:
+        if self.config.contacts.renewal == "keep":
+            uniform, _ = uniforms(self.config.run.seed, self.realization, contact, 0)
+            return self.law.isf(uniform * self.law.sf(0.0))
         seed = self.config.run.seed
         uniform, _ = uniforms(seed, self.realization, contact, int(self.renewal[contact]))
         return self.law.isf(uniform * self.law.sf(least_configured(self.config)))
@@ -139,10 +160,10 @@ class Contacts:
         """Thresholds of now [N]."""
         contacts = self.config.contacts
         if contacts.ageing is None:
-            return self.u * contacts.contact_static_force
+            return self.factor * self.u * contacts.contact_static_force
         z = (self.u - 1) / contacts.threshold.relative_width
         mean, width = aged(self.config, self.time - self.birth)
-        return (mean + width * z) * contacts.contact_static_force
+        return self.factor * (mean + width * z) * contacts.contact_static_force
 
     @property
     def pinned(self) -> np.ndarray:
@@ -237,13 +258,15 @@ class Contacts:
                 self.renewal[contact] += 1
                 self.u[contact] = self.draw(contact)
                 self.deviate[contact] = self.draw_deviate(contact)
+                self.factor[contact], self.birth[contact] = self.strength(x), time
                 force = self.direction * contacts.back_force_ratio * contacts.contact_static_force
+                if contacts.renewal == "keep":
+                    force = self.direction * contacts.back_force_ratio * self.thresholds[contact]
                 force += self.bonds[contact] @ self.stretch(x)
                 self.origin[contact] = x - force / (
                     self.stiffness[contact] + self.bonds[contact].sum()
                 )
                 self.due[contact] = np.nan
-                self.birth[contact] = time
         self.events += [(time, contact) for contact in broken]
         if broken:
             self.avalanches.append((time, broken))

@@ -125,6 +125,8 @@ LATTICE = {"strength": 0.3, "columns": 60, "rows": 68}
         ("contacts__count", 0, ["contacts.count", "greater than or equal to 1"]),
         ("contacts__count", 2.5, ["contacts.count", "integer"]),
         ("contacts__area", None, ["contacts.area", "drag_rate"]),
+        ("contacts__drag", "0.1 N s/m", ["contacts.drag", "either drag or drag_rate"]),
+        ("contacts__drag", "0.1 N/m", ["contacts.drag", "N s/m"]),
         ("contacts__delay", "-1 ms", ["contacts.delay", "greater than or equal to 0"]),
         ("contacts__back_force_ratio", 1.0, ["contacts.back_force_ratio", "less than 1"]),
         ("contacts__coupling", "loose", ["contacts.coupling", "loose", "scaled"]),
@@ -741,6 +743,7 @@ BOUNDED = [
     ("contacts__area", "m^2"),
     ("contacts__film_thickness", "m"),
     ("contacts__film_density", "kg/m^3"),
+    ("contacts__drag", "N s/m"),
     ("contacts__drag_rate", "1/s"),
     ("contacts__delay", "s"),
 ]
@@ -1002,7 +1005,12 @@ def test_what_the_kernel_is_reported_of_contacts(klein):
     kind = config.contact_kind
     assert (kind.kernel_kind, kind.is_discrete, kind.on_lattice) == ("populations", False, False)
     assert kind.kernel_parameters(config) == common | {"resolution": 0.25}
-    assert kind.max_realizations == 1
+
+    # N m eta without a film
+    given = 4080 * common["drag"].expected
+    film = dict.fromkeys(("area", "film_thickness", "film_density", "drag_rate"))
+    config = klein(contacts=klein().to_dict()["contacts"] | film | {"drag": f"{given!r} N s/m"})
+    assert config.contact_kind.kernel_parameters(config) == common | {"columns": 0, "rows": 0}
 
     config = klein(slider=QUASISTATIC)
     printed = config.contact_kind.kernel_parameters(config)

@@ -18,6 +18,9 @@ FAST = {
 }
 
 
+TRACK = {"spread": 0.3, "length": 1e-8}
+
+
 def breaks(config) -> list[tuple[float, int]]:
     """Time and contact of each break, by advancing one event at a time."""
     realization = Realization(config, 0)
@@ -40,8 +43,14 @@ def breaks(config) -> list[tuple[float, int]]:
         {"contacts__count": 3, "contacts__delay": 0.0},
         {"contacts__count": 5, "contacts__delay": 2e-3, "contacts__drag_rate": 2e16},
         {"contacts__count": 5, "drive__velocity": -1e-5},
+        {"contacts__count": 5, "contacts__track": TRACK},
+        {"contacts__count": 5, "contacts__renewal": "keep", "contacts__coupling": "equal"},
+        {"contacts__count": 5, "contacts__renewal": "keep", "contacts__track": TRACK},
     ],
-    ids=["one", "one undamped", "one bundle", "no delay", "strong drag", "backward"],
+    ids=[
+        *("one", "one undamped", "one bundle", "no delay", "strong drag", "backward", "track"),
+        *("keep", "keep, track"),
+    ],
 )
 def test_events_are_those_of_matrix_exponentials(klein, changes):
     config = klein(**FAST | changes)

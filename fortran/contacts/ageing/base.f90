@@ -95,8 +95,9 @@ module mesoslip_contacts_ageing_base
       !> Contacts of the breaks in the schedule
       integer :: listed(max_events) = 0
    contains
-      procedure :: rebuild, behind_of, records
-      procedure, non_overridable :: solve, solve_all, put, refresh, threshold, ahead_of, behind_at
+      procedure :: rebuild, behind_of, records, limit_at_birth
+      procedure, non_overridable :: solve, solve_all, put, refresh, threshold, mean_of, ahead_of, &
+         & behind_at
       procedure, non_overridable :: is_due, record_lateness, count_visits
    end type ageing_contacts_type
 
@@ -145,7 +146,7 @@ contains
       associate (life => self%life(:, contact), limit => self%record(row_limit, contact))
          age = time - life(life_birth)
          if (self%ageing%is_old(age) .or. self%ageing%is_constant(life(life_limit), &
-            & self%stretch)) then
+            & self%mean_of(contact))) then
             limit = life(life_limit)
             life(life_motion) = any_motion
             return
@@ -153,11 +154,12 @@ contains
          stretch = self%direction * (displacement - self%record(row_origin, contact))
          if (self%is_steady) then
             life(life_motion) = self%motion
-            limit = meet(self%ageing, life(life_limit), self%stretch, age, stretch, self%speed)
+            limit = meet(self%ageing, life(life_limit), self%mean_of(contact), age, stretch, &
+               & self%speed)
          else
             life(life_motion) = no_motion
-            limit = meet_bound(self%ageing, life(life_limit), self%stretch, age, stretch, &
-               & self%speed)
+            limit = meet_bound(self%ageing, life(life_limit), self%mean_of(contact), age, &
+               & stretch, self%speed)
          end if
       end associate
    end subroutine solve
@@ -207,9 +209,28 @@ contains
       real(wp), intent(in) :: time
       real(wp) :: threshold
 
-      threshold = self%ageing%threshold(self%life(life_limit, contact), self%stretch, &
+      threshold = self%ageing%threshold(self%life(life_limit, contact), self%mean_of(contact), &
          & time - self%life(life_birth, contact))
    end function threshold
+
+   !> Mean configured breaking stretch at the place on the track where a contact attached [m].
+   pure function mean_of(self, contact) result(mean)
+      class(ageing_contacts_type), intent(in) :: self
+      integer, intent(in) :: contact
+      real(wp) :: mean
+
+      mean = self%stretch
+      if (allocated(self%births%factor)) mean = mean * self%births%factor(contact)
+   end function mean_of
+
+   !> A threshold that falls must not detach the contact later.
+   pure function limit_at_birth(self, limit) result(newborn)
+      class(ageing_contacts_type), intent(in) :: self
+      real(wp), intent(in) :: limit
+      real(wp) :: newborn
+
+      newborn = self%ageing%newborn_threshold(limit, self%stretch)
+   end function limit_at_birth
 
    !> Coordinate at which a contact with its present limit breaks in the direction of motion.
    pure function ahead_of(self, contact) result(coordinate)
@@ -258,7 +279,9 @@ contains
       real(wp) :: limit
 
       limit = self%life(life_limit, contact)
-      if (.not. self%ageing%falls(limit, self%stretch)) limit = self%threshold(contact, time)
+      if (.not. self%ageing%falls(limit, self%mean_of(contact))) then
+         limit = self%threshold(contact, time)
+      end if
       coordinate = self%direction * self%record(row_origin, contact) - limit
    end function behind_at
 

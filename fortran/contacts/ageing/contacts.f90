@@ -77,6 +77,7 @@ contains
       self%may_outrun = self%ageing%acts() .and. .not. self%jumps
       if (self%jumps) self%speed = huge(1.0_wp)
       call self%allocate_records(0, 0, error)
+      if (.not. allocated(error)) call self%births%record_factors(self%parameters, error)
       if (allocated(error)) return
       associate (count => common%count)
          allocate (self%life(life_length, count), source=0.0_wp, stat=stat)
@@ -96,7 +97,8 @@ contains
          & self%ageing%time, longest, rate)
       longest = max(longest, self%parameters%law%quantile(negligible), 1.0_wp)
       call new_contact_queue(self%queue, common%count, &
-         & 1.1_wp * self%stretch * longest * (1.0_wp + common%back_force_ratio), error)
+         & 1.1_wp * self%stretch * longest * (1.0_wp + common%back_force_ratio) &
+         & * common%strength%usual_max(), error)
       call move_alloc(self, contacts)
    end subroutine make_contact_ageing
 
@@ -175,6 +177,8 @@ contains
 
       schedule%is_over = .true.
       if (pose%inverse_mass > 0.0_wp .or. pose%direction * self%direction < 0.0_wp) return
+      ! Limits are solved before it is known where contacts attach, and under one force.
+      if (self%parameters%strength%is_used .or. self%parameters%keeps_thresholds) return
       self%cost = 1.0_wp
       call follow_motion(self, pose)
       if (self%is_steady) call plan_steady(self, pose, limit, schedule)
@@ -254,7 +258,7 @@ contains
       integer, intent(in) :: contact
       real(wp), intent(in) :: displacement, time
 
-      if (self%ageing%falls(self%life(life_limit, contact), self%stretch) &
+      if (self%ageing%falls(self%life(life_limit, contact), self%mean_of(contact)) &
          & .and. .not. self%ageing%is_old(time - self%life(life_birth, contact))) then
          self%kept(contact) = in_falling
          call append(self%list(falling), contact)

@@ -37,7 +37,7 @@ contains
          fastest = 0.0_wp
          do position = 1, self%list(falling)%count
             contact = self%list(falling)%contact(position)
-            call self%ageing%evaluate(self%life(life_limit, contact), self%stretch, &
+            call self%ageing%evaluate(self%life(life_limit, contact), self%mean_of(contact), &
                & pose%time - self%life(life_birth, contact), limit, rate)
             fastest = max(fastest, -rate)
          end do
@@ -151,8 +151,8 @@ contains
       max_step = end_time - pose%time
       step = 0.0_wp
       do number = 1, max_steps
-         call self%ageing%evaluate(self%life(life_limit, contact), self%stretch, age + step, &
-            & limit, rate)
+         call self%ageing%evaluate(self%life(life_limit, contact), self%mean_of(contact), &
+            & age + step, limit, rate)
          gap = limit - stretch - speed * step
          if (gap <= 0.1_wp * tiny_gap * self%stretch) exit
          if (speed - rate > 0.0_wp) then

@@ -46,7 +46,7 @@ module mesoslip_contacts_ageing_law
       real(wp) :: growth = 0.0_wp
    contains
       procedure, non_overridable :: evaluate, threshold, curvature, grow, configured, deficit
-      procedure, non_overridable :: falls, acts, is_constant, is_old
+      procedure, non_overridable :: falls, acts, is_constant, is_old, newborn_threshold
    end type ageing_law_type
 
 contains
@@ -182,6 +182,15 @@ contains
 
       call self%evaluate(configured, mean, age, threshold, rate)
    end function threshold
+
+   !> Minimum of the threshold of a contact that attaches, now and when it is old.
+   pure function newborn_threshold(self, configured, mean) result(threshold)
+      class(ageing_law_type), intent(in) :: self
+      real(wp), intent(in) :: configured, mean
+      real(wp) :: threshold
+
+      threshold = min(configured, self%threshold(configured, mean, 0.0_wp))
+   end function newborn_threshold
 
    !> Configured threshold of the contacts that break at an age under a force, both over the mean.
    pure function configured(self, force, age)

@@ -180,7 +180,8 @@ contains
       if (self%life(life_motion, contact) >= any_motion) return
       if (self%jumps .and. .not. self%is_unchanged) return
       age = pose%time - self%life(life_birth, contact)
-      call self%ageing%evaluate(self%life(life_limit, contact), self%stretch, age, limit, rate)
+      call self%ageing%evaluate(self%life(life_limit, contact), self%mean_of(contact), age, limit, &
+         & rate)
       speed = self%direction * pose%velocity
       if (.not. speed > rate) return
       here = self%direction * self%record(row_origin, contact) + limit

@@ -58,7 +58,7 @@ contains
       do contact = 1, self%parameters%count
          if (.not. self%record(row_stiffness, contact) > 0.0_wp) cycle
          if (self%life(life_motion, contact) >= any_motion) cycle
-         if (.not. self%ageing%falls(self%life(life_limit, contact), self%stretch)) cycle
+         if (.not. self%ageing%falls(self%life(life_limit, contact), self%mean_of(contact))) cycle
          call append(self%list(falling), contact)
          self%kept(contact) = in_falling
       end do
@@ -96,14 +96,15 @@ contains
 
       self%kept(contact) = in_queue
       associate (life => self%life(:, contact), next => self%next(:, contact))
-         if (self%ageing%is_constant(life(life_limit), self%stretch)) then
+         if (self%ageing%is_constant(life(life_limit), self%mean_of(contact))) then
             life(life_motion) = any_motion
             next(next_speed) = 0.0_wp
             return
          end if
          life(life_motion) = self%motion
-         if (abs(next(next_speed) - self%speed) > 0.0_wp) then
-            next(next_limit) = newborn_limit(self, life(life_limit))
+         if (abs(next(next_speed) - self%speed) > 0.0_wp &
+            & .or. self%parameters%strength%is_used .or. self%parameters%keeps_thresholds) then
+            next(next_limit) = newborn_limit(self, life(life_limit), self%mean_of(contact))
          end if
          self%record(row_limit, contact) = next(next_limit)
          next(next_speed) = 0.0_wp
@@ -111,14 +112,19 @@ contains
       call solve_later(self, contact)
    end subroutine queue_newborn
 
-   !> Limit of a contact with a configured breaking stretch [m] that is born in the steady motion.
-   pure function newborn_limit(self, configured) result(limit)
+   !> Limit of a contact with a configured breaking stretch [m] that is born in the steady motion,
+   !> given the mean one there.
+   pure function newborn_limit(self, configured, mean) result(limit)
       class(ageing_contacts_type), intent(in) :: self
-      real(wp), intent(in) :: configured
+      real(wp), intent(in) :: configured, mean
       real(wp) :: limit
 
-      limit = meet(self%ageing, configured, self%stretch, 0.0_wp, &
-         & self%parameters%back_force_ratio * self%stretch, self%speed)
+      real(wp) :: stretch
+
+      stretch = self%parameters%back_force_ratio * self%stretch
+      if (self%parameters%keeps_thresholds) stretch = self%parameters%back_force_ratio &
+         & * self%ageing%newborn_threshold(configured, mean)
+      limit = meet(self%ageing, configured, mean, 0.0_wp, stretch, self%speed)
    end function newborn_limit
 
    !> Have the next limit of a contact solved with those of others.
@@ -127,6 +133,8 @@ contains
       integer, intent(in) :: contact
 
       self%solved = self%solved + 1
+      ! With a track, limits depend on where contacts attach.
+      if (self%parameters%strength%is_used .or. self%parameters%keeps_thresholds) return
       self%unsolved_count = self%unsolved_count + 1
       self%unsolved(self%unsolved_count) = contact
       if (self%unsolved_count == solved_together) call solve_next_lives(self)
@@ -209,7 +217,7 @@ contains
             next(next_configured) = limit(event)
             if (self%ageing%is_constant(limit(event), self%stretch)) cycle
             if (abs(next(next_speed) - self%speed) > 0.0_wp) then
-               next(next_limit) = newborn_limit(self, limit(event))
+               next(next_limit) = newborn_limit(self, limit(event), self%stretch)
                next(next_speed) = self%speed
             end if
             limit(event) = next(next_limit)

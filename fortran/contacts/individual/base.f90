@@ -9,7 +9,8 @@ module mesoslip_contacts_individual_base
       & extent_length
    use mesoslip_contacts_individual_avalanche_track, only: avalanche_track_type, &
       & new_avalanche_track, row_generation
-   use mesoslip_contacts_individual_births, only: bear, bear_by_rule, births_type, drag_of
+   use mesoslip_contacts_individual_births, only: bear, bear_by_rule, births_type, drag_of, &
+      & draw_again
    use mesoslip_contacts_individual_detached, only: detached_contacts_type, new_detached_contacts
    use mesoslip_contacts_mechanics, only: coupling_table, delay_fixed
    use mesoslip_contacts_individual_record, only: record_length, row_limit, row_next, &
@@ -59,6 +60,8 @@ module mesoslip_contacts_individual_base
       procedure :: neighbour_force
       !> Shift the origin in further data of a kind
       procedure :: shift_order
+      !> Breaking stretch of a contact when it attaches
+      procedure :: limit_at_birth
       !> Allocate the records, and draw all contacts at the start of a run
       procedure, non_overridable :: allocate_records, draw
       !> Detach a contact that breaks, and attach all contacts that are due
@@ -68,11 +71,11 @@ module mesoslip_contacts_individual_base
       !> Window between two coordinates
       procedure, non_overridable :: window_between
       !> List the next attachments and births in a schedule
-      procedure, non_overridable :: list_attachments, list_births
+      procedure, non_overridable :: list_attachments, list_births, knows_lives
       !> Update records and sums after a schedule, but not the order of breaking
       procedure, non_overridable :: detach_listed, attach_listed
       procedure, non_overridable, private :: attach_next, draw_births, give_birth, list_lives, &
-         & sum_totals
+         & own_excess, fit_to_track, sum_totals
    end type individual_contacts_type
 
    abstract interface
@@ -122,7 +125,11 @@ contains
       !> One of the initial_ codes
       integer, intent(in) :: state
 
-      call self%births%draw_all(self%parameters, state, self%record)
+      real(wp) :: factor
+
+      factor = 1.0_wp
+      if (self%parameters%strength%is_used) factor = self%parameters%strength%factor(0.0_wp)
+      call self%births%draw_all(self%parameters, state, factor, self%record)
       call self%sum_totals()
    end subroutine draw
 
@@ -231,12 +238,26 @@ contains
       real(wp), intent(in) :: mean_force
       integer, intent(out) :: contact
 
-      real(wp) :: stiffness, limit, origin, drag, force
+      real(wp) :: stiffness, limit, origin, stretch, drag, force, factor
 
       call self%detached%pop(contact, drag)
       call self%draw_births([contact])
       call self%give_birth(contact, mean_force, pose%direction, stiffness, limit, force)
-      origin = pose%displacement - force / (stiffness + self%bonds)
+      factor = 1.0_wp
+      if (self%parameters%strength%is_used) then
+         call self%fit_to_track(contact, mean_force, pose, factor, stiffness, limit, force)
+      else if (self%parameters%keeps_thresholds) then
+         force = force + pose%direction * self%own_excess(stiffness, self%limit_at_birth(limit))
+      end if
+      stretch = force / (stiffness + self%bonds)
+      if (self%parameters%keeps_thresholds .and. .not. (allocated(self%births%force) &
+         & .or. self%bonds > 0.0_wp)) then
+         ! To the last digit as in a schedule.
+         stretch = factor * (pose%direction * self%parameters%back_force_ratio &
+            & * self%limit_at_birth(limit))
+      end if
+      limit = factor * limit
+      origin = pose%displacement - stretch
       call self%drag%add(-drag)
       if (self%detached%count == 0) self%drag = accumulator_type()
       call self%birth_gain%add(0.5_wp * stiffness * (pose%displacement - origin)**2)
@@ -268,6 +289,11 @@ contains
       schedule%attachments = number
       schedule%attached = 0
       schedule%delay = self%parameters%delay
+      if (self%parameters%strength%is_used) then
+         if (.not. schedule%strength%is_used) schedule%strength = self%parameters%strength
+         schedule%strength%origin = self%parameters%strength%origin
+         schedule%scales_stretches = self%parameters%keeps_thresholds
+      end if
       if (.not. self%parameters%reattach) schedule%delay = huge(1.0_wp)
       schedule%stiffness = self%stiffness
       schedule%offset = self%offset
@@ -328,10 +354,18 @@ contains
             stretch(event) = back_force / stiffness(event)
          end do
       end if
+      if (self%parameters%keeps_thresholds) then
+         do event = 1, size(contact)
+            stretch(event) = direction * self%parameters%back_force_ratio * limit(event)
+         end do
+      end if
       if (.not. allocated(self%births%force)) return
       do event = 1, size(contact)
          call self%give_birth(contact(event), back_force, direction, stiffness(event), &
             & limit(event), force)
+         if (self%parameters%keeps_thresholds) then
+            force = force + direction * self%own_excess(stiffness(event), limit(event))
+         end if
          stretch(event) = force / stiffness(event)
       end do
    end subroutine list_lives
@@ -366,6 +400,76 @@ contains
          & * self%parameters%static_force &
          & * (self%births%force(contact) - self%parameters%back_force_ratio)
    end subroutine give_birth
+
+   !> Find the factor of the threshold of a contact that attaches where it is on the track.
+   !>
+   !> A contact that cannot bear the force with which it attaches is drawn again, as others are.
+   subroutine fit_to_track(self, contact, mean_force, pose, factor, stiffness, limit, force)
+      class(individual_contacts_type), intent(inout) :: self
+      integer, intent(in) :: contact
+      !> Mean force of a contact when it attaches, including that of its neighbours [N]
+      real(wp), intent(in) :: mean_force
+      type(pose_type), intent(in) :: pose
+      !> Factor of the threshold
+      real(wp), intent(out) :: factor
+      !> Stiffness [N/m], breaking stretch without the factor [m], force when it attaches [N]
+      real(wp), intent(inout) :: stiffness, limit, force
+
+      real(wp) :: mean_own, threshold, ratio, excess
+      integer :: attempt
+
+      associate (static => pose%direction * self%parameters%static_force)
+         mean_own = static * self%parameters%back_force_ratio
+         factor = self%parameters%strength%factor(pose%displacement)
+         attempt = 0
+         do
+            excess = pose%direction &
+               & * self%own_excess(stiffness, factor * self%limit_at_birth(limit))
+            if (abs(force + excess - mean_force + mean_own) &
+               & < stiffness * (factor * self%limit_at_birth(limit)) .or. attempt < 0) exit
+            call draw_again(self%parameters, self%record(:, contact), contact, attempt, &
+               & threshold, ratio)
+            call bear(self%parameters, threshold, stiffness, limit)
+            force = mean_force - mean_own + static * ratio
+         end do
+      end associate
+      force = force + excess
+      if (allocated(self%births%factor)) self%births%factor(contact) = factor
+   end subroutine fit_to_track
+
+   !> Force at attaching of a contact that keeps its threshold, whose mean is a part of that, beyond
+   !> that of other contacts [N]; 0 for those.
+   pure function own_excess(self, stiffness, limit) result(force)
+      class(individual_contacts_type), intent(in) :: self
+      !> Stiffness [N/m] and breaking stretch when it attaches [m]
+      real(wp), intent(in) :: stiffness, limit
+      real(wp) :: force
+
+      force = 0.0_wp
+      if (self%parameters%keeps_thresholds) force = self%parameters%back_force_ratio &
+         & * (stiffness * limit - self%parameters%static_force)
+   end function own_excess
+
+   !> Whether the next lives of contacts are known before they attach, up to the strength there.
+   pure function knows_lives(self)
+      class(individual_contacts_type), intent(in) :: self
+      logical :: knows_lives
+
+      ! Else the strength changes a part of the force at attaching only.
+      knows_lives = .not. (self%parameters%keeps_thresholds .and. allocated(self%births%force) &
+         & .and. self%parameters%strength%is_used)
+   end function knows_lives
+
+   !> Breaking stretch of a contact when it attaches: the configured one, of contacts that do not
+   !> age.
+   pure function limit_at_birth(self, limit) result(newborn)
+      class(individual_contacts_type), intent(in) :: self
+      !> Configured breaking stretch [m]
+      real(wp), intent(in) :: limit
+      real(wp) :: newborn
+
+      newborn = limit
+   end function limit_at_birth
 
    !> Update records and sums for the contacts that broke in a schedule.
    subroutine detach_listed(self, contact, schedule)
@@ -462,6 +566,7 @@ contains
       do contact = 1, self%parameters%count
          self%record(row_origin, contact) = self%record(row_origin, contact) - shift
       end do
+      self%parameters%strength%origin = self%parameters%strength%origin + shift
       call self%sum_totals()
       call self%shift_order(shift)
       call self%rebuild_queue(displacement)

@@ -5,8 +5,8 @@
 module mesoslip_contacts_populations_breaking
    use mesoslip_contacts_mechanics, only: broken_threshold
    use mesoslip_contacts_populations_rows, only: column_ahead, column_behind, column_birth, &
-      & column_broken, column_force, column_law, column_level, column_origin, column_weight, &
-      & compliant, lost, massive, moments_length, number, population_rows_type, stiff
+      & column_broken, column_factor, column_force, column_law, column_level, column_origin, &
+      & column_weight, compliant, lost, massive, moments_length, number, population_rows_type, stiff
    use mesoslip_contacts_populations_survivors, only: no_level
    use mesoslip_interface_law, only: pose_type
    use mesoslip_numerics_accumulator, only: accumulator_type
@@ -96,7 +96,7 @@ contains
    subroutine find_thresholds(self)
       class(breaking_populations_type), intent(inout) :: self
 
-      real(wp) :: distance, force, broken
+      real(wp) :: distance, force, broken, factor
       integer :: row, one
 
       associate (trial => self%trial)
@@ -105,6 +105,13 @@ contains
             force = trial%direction * self%population(row, column_force)
             distance = trial%direction * (trial%end - self%population(row, column_origin)) &
                & / self%stretch
+            trial%force(one) = force
+            trial%distance(one) = distance
+            if (self%has_track) then
+               factor = self%population(row, column_factor)
+               force = force / factor
+               distance = distance / factor
+            end if
             if (self%has_table) then
                broken = 0.0_wp
             else if (self%ages) then
@@ -113,8 +120,6 @@ contains
             else
                broken = broken_threshold(self%parameters%coupling, force, distance)
             end if
-            trial%force(one) = force
-            trial%distance(one) = distance
             trial%broken(one) = max(self%population(row, column_broken), broken)
          end do
       end associate
@@ -137,6 +142,9 @@ contains
                   & trial%broken(one), moments)
             end if
             if (moments(number) < unresolved_part) moments = 0.0_wp
+            if (self%has_track) then
+               moments(lost) = self%population(row, column_factor)**2 * moments(lost)
+            end if
             trial%moments(:, one) = min(self%population(row, column_weight) * moments, &
                & self%left(:, row))
          end do
@@ -223,21 +231,28 @@ contains
       real(wp), intent(in) :: last, last_force
       real(wp) :: energy
 
-      real(wp) :: first, start_force, start_broken, part, first_force
+      real(wp) :: first, start_force, start_broken, part, first_force, end_force, factor
 
       energy = 0.0_wp
       first = self%population(row, column_broken)
       if (.not. last > first) return
       start_force = max(0.0_wp, self%trial%direction * (self%population(row, column_force) &
          & + (before%displacement - self%population(row, column_origin)) / self%stretch))
+      end_force = last_force
+      factor = 1.0_wp
+      if (self%has_track) then
+         factor = self%population(row, column_factor)
+         start_force = start_force / factor
+         end_force = end_force / factor
+      end if
       start_broken = self%ageing%configured(start_force, &
          & before%time - self%population(row, column_birth))
       part = 0.0_wp
       if (start_broken < first) part = (first - start_broken) / (last - start_broken)
-      first_force = start_force + part * (last_force - start_force)
+      first_force = start_force + part * (end_force - start_force)
       if (start_broken > first) first = start_broken
-      energy = ((first_force**2 - first**2) + (first_force * last_force - first * last) &
-         & + (last_force**2 - last**2)) / 3.0_wp
+      energy = factor**2 * ((first_force**2 - first**2) + (first_force * end_force &
+         & - first * last) + (end_force**2 - last**2)) / 3.0_wp
    end function more_lost
 
    !> Begin a trial: make room for all populations, and set its motion.

@@ -22,6 +22,8 @@ module mesoslip_contacts_populations_pinned
    real(wp), parameter :: max_spread = 0.35_wp
    !> Length of a step over the resolution times the spread of the breaking stretches
    real(wp), parameter :: step_part = 0.6_wp
+   !> The same over the resolution times the correlation length of a track
+   real(wp), parameter :: track_part = 0.4_wp
    !> Stretch beyond which the cells of the initial states of wide laws grow with it
    real(wp), parameter :: min_even = 0.02_wp
    !> Number of forces at attaching if they have a width, evenly spaced, and their range in standard
@@ -33,18 +35,21 @@ module mesoslip_contacts_populations_pinned
    type, extends(thermal_populations_type) :: pinned_populations_type
       !> Mean stiffness of a contact that attaches [N/m], and the energy it gains [J]
       real(wp) :: newborn_stiffness = 0.0_wp, newborn_energy = 0.0_wp
+      !> Factor of the thresholds of contacts that attach, on a track
+      real(wp) :: factor = 1.0_wp
       !> Mean relative force of a contact that attaches
       real(wp) :: newborn_force = 0.0_wp
       !> Number of forces at attaching; for each the relative force, the threshold up to which no
-      !> contact can attach with it, and the shares of contacts before and after the rejection of
-      !> these
+      !> contact can attach with it, and the shares of contacts: before the rejection of these, not
+      !> normalized and normalized, and after it
       integer, private :: classes = 1
       real(wp), private :: class_force(max_classes) = 0.0_wp, class_broken(max_classes) = 0.0_wp, &
-         & share(max_classes) = 1.0_wp, newborn_share(max_classes) = 1.0_wp
+         & weight(max_classes) = 1.0_wp, share(max_classes) = 1.0_wp, &
+         & newborn_share(max_classes) = 1.0_wp
    contains
-      procedure, non_overridable :: set_ageing, activate, initialize, attach
-      procedure, non_overridable, private :: tabulate_moments, place_classes, sum_newborns, &
-         & law_of, may_join_last, add_sliding
+      procedure, non_overridable :: set_ageing, activate, initialize, attach, sum_newborns
+      procedure, non_overridable, private :: tabulate_moments, place_classes, law_of, &
+         & may_join_last, add_sliding
    end type pinned_populations_type
 
 contains
@@ -59,6 +64,8 @@ contains
       call new_population_rows(self, parameters)
       self%step = step_length(parameters%law%width, resolution, self%stretch)
       if (parameters%coupling == coupling_scaled) self%step = 0.5_wp * self%step
+      if (self%has_track) self%step = min(self%step, &
+         & track_part * resolution * parameters%strength%correlation_length())
 
       self%class_force(1) = parameters%back_force_ratio
       self%newborn_force = parameters%back_force_ratio
@@ -70,7 +77,7 @@ contains
       else
          call self%tabulate_moments()
       end if
-      call self%sum_newborns()
+      call self%sum_newborns(1.0_wp)
    end subroutine new_pinned_populations
 
    !> Tabulate the moments of the law of thresholds.
@@ -122,7 +129,7 @@ contains
          deviate = reach * (2.0_wp * (class - 1) / (max_classes - 1) - 1.0_wp)
          self%class_force(class) = self%parameters%back_force_ratio &
             & + self%parameters%newborn_width * deviate
-         self%share(class) = exp(-0.5_wp * deviate**2)
+         self%weight(class) = exp(-0.5_wp * deviate**2)
          ! The law of a table with stiffnesses depends on the force.
          if (self%parameters%coupling /= coupling_table) then
             self%class_broken(class) = abs(self%class_force(class))
@@ -130,13 +137,21 @@ contains
       end do
    end subroutine place_classes
 
-   !> Sum up the contacts that attach: the law of forces is cut off at the thresholds.
-   subroutine sum_newborns(self)
+   !> Sum up the contacts that attach: the law of forces is cut off at the thresholds, which are
+   !> multiplied by a factor.
+   subroutine sum_newborns(self, factor)
       class(pinned_populations_type), intent(inout) :: self
+      real(wp), intent(in) :: factor
 
       real(wp) :: left(moments_length, max_classes)
       integer :: class
 
+      self%factor = factor
+      if (self%has_track) then
+         self%class_broken(:self%classes) = abs(self%class_force(:self%classes)) / factor
+         if (self%ages) self%class_broken(1) = max(self%class_broken(1), &
+            & self%ageing%configured(self%class_broken(1), 0.0_wp))
+      end if
       do class = 1, self%classes
          if (self%has_table) then
             call self%table_lives%left(newborn_law(class, 1.0_wp), 0.0_wp, 0.0_wp, left(:, class))
@@ -146,8 +161,8 @@ contains
       end do
       associate (static => self%parameters%static_force, share => self%share(:self%classes), &
          & force => self%class_force(:self%classes), all => left(:, :self%classes))
-         if (self%classes > 1) then
-            share = share / sum(share * all(number, :))
+         if (self%classes > 1 .or. self%has_track) then
+            share = self%weight(:self%classes) / sum(self%weight(:self%classes) * all(number, :))
             self%newborn_share(:self%classes) = share * all(number, :)
             self%newborn_force = sum(share * all(number, :) * force)
          end if
@@ -186,8 +201,8 @@ contains
       else if (state == initial_uniform) then
          call self%add_sliding(0.0_wp, 1.0_wp, 2, 0.0_wp, error)
       else
-         call self%add(0.0_wp, 0.0_wp, real(self%parameters%count, wp), 1, 0.0_wp, 0.0_wp, &
-            & -self%ageing%initial_age, 0.0_wp, error)
+         call self%add(0.0_wp, 0.0_wp, self%factor, real(self%parameters%count, wp), 1, 0.0_wp, &
+            & 0.0_wp, -self%ageing%initial_age, 0.0_wp, error)
       end if
       if (allocated(error)) return
       if (state == initial_steady .or. state == initial_uniform) then
@@ -220,7 +235,8 @@ contains
          if (self%has_table) then
             max_distance = self%table_lives%longest(moments)
          else
-            max_distance = breaking_distance(coupling, force, self%moments(1)%max_threshold)
+            max_distance = self%factor * breaking_distance(coupling, force / self%factor, &
+               & self%moments(1)%max_threshold)
          end if
          edge = 0.0_wp
          even = 1.0_wp
@@ -233,10 +249,11 @@ contains
             edge = edge + cell
             reached = middle
             if (.not. self%has_table) then
-               reached = max(broken, broken_threshold(coupling, force, middle))
+               reached = max(broken, broken_threshold(coupling, force / self%factor, &
+                  & middle / self%factor))
             end if
-            call self%add(-middle * self%stretch, force, share * cell, moments, reached, 0.0_wp, &
-               & -self%ageing%initial_age, 0.0_wp, error)
+            call self%add(-middle * self%stretch, force, self%factor, share * cell, moments, &
+               & reached, 0.0_wp, -self%ageing%initial_age, 0.0_wp, error)
          end do
       end associate
    end subroutine add_sliding
@@ -271,7 +288,7 @@ contains
             call self%join_last(self%count - self%classes + class, origin, birth, &
                & births * self%newborn_share(class), mean_force, displacement, time, lost)
          else
-            call self%add(origin, force, self%share(class) * births, &
+            call self%add(origin, force, self%factor, self%share(class) * births, &
                & self%law_of(class, direction), self%class_broken(class), displacement, birth, &
                & time, error)
             if (allocated(error)) return

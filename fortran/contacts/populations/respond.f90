@@ -177,8 +177,11 @@ contains
       call self%detached%take_due(before, after, births, moment, when)
       if (.not. births > 0.0_wp) return
 
-      call self%birth_gain%add(births * self%pinned%newborn_energy)
       origin = moment / births
+      if (self%pinned%has_track) then
+         call self%pinned%sum_newborns(self%parameters%strength%factor(origin))
+      end if
+      call self%birth_gain%add(births * self%pinned%newborn_energy)
       force = after%direction * self%pinned%newborn_force
       call self%step_work%add(-births * (after%displacement - origin) &
          & * (0.5_wp * self%pinned%newborn_stiffness * (after%displacement - origin) &

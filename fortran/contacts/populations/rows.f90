@@ -12,6 +12,10 @@
 !> broken: a population keeps how far the slider was ahead of its origin and behind it, where it
 !> breaks next.
 !>
+!> With a strength along the track, the thresholds of a population are multiplied by the factor of
+!> the place where it attached. Forces and distances over that factor are those of a population
+!> without one. What is kept are thresholds before it, and energies after it.
+!>
 !> Forces of populations are in units of f_s, their stiffness of k, distances of f_s/k.
 module mesoslip_contacts_populations_rows
    use mesoslip_contacts_ageing_law, only: ageing_law_type
@@ -30,15 +34,15 @@ module mesoslip_contacts_populations_rows
    public :: population_rows_type, new_population_rows
    public :: moments_length, number, stiff, compliant, lost, massive
    public :: column_origin, column_force, column_weight, column_broken, column_law, column_ahead, &
-      & column_behind, column_birth, column_level
+      & column_behind, column_factor, column_birth, column_level
 
    !> Moments of the thresholds of a population's pinned contacts: number, stiffness, one over it,
    !> twice the energy that they lose in breaking, and mass
    integer, parameter :: moments_length = 5
    integer, parameter :: number = 1, stiff = 2, compliant = 3, lost = 4, massive = 5
 
-   !> Numbers of a population, besides its moments
-   integer, parameter :: population_length = 9
+   !> Numbers of a population, besides its moments, without a track and with one
+   integer, parameter :: population_length = 9, track_length = 10
    !> Displacement at which stretches are zero except for the force at attaching [m]
    integer, parameter :: column_origin = 1
    !> Force at attaching, signed
@@ -56,6 +60,8 @@ module mesoslip_contacts_populations_rows
    integer, parameter :: column_birth = 8
    !> Level of the hazard of thermal activation
    integer, parameter :: column_level = 9
+   !> With a track, the factor of the thresholds
+   integer, parameter :: column_factor = 10
 
    !> Populations for which there is room at first
    integer, parameter :: initial_rows = 64
@@ -77,6 +83,8 @@ module mesoslip_contacts_populations_rows
       real(wp) :: last_birth = 0.0_wp
 
       type(contact_parameters_type) :: parameters
+      !> Whether strength varies along the track
+      logical :: has_track = .false.
       !> Stretch of a mean contact at its threshold, f_s/k [m]
       real(wp) :: stretch = 1.0_wp
       !> Threshold at which the first contacts of a population break
@@ -113,15 +121,18 @@ contains
 
       self%parameters = parameters
       self%stretch = parameters%static_force / parameters%stiffness
-      allocate (self%population(initial_rows, population_length), source=0.0_wp)
+      self%has_track = parameters%strength%is_used
+      allocate (self%population(initial_rows, merge(track_length, population_length, &
+         & self%has_track)), source=0.0_wp)
       allocate (self%left(moments_length, initial_rows), source=0.0_wp)
    end subroutine new_population_rows
 
    !> Add a population.
-   subroutine add(self, origin, force, weight, law, broken, displacement, birth, time, error)
+   subroutine add(self, origin, force, factor, weight, law, broken, displacement, birth, time, &
+      & error)
       class(population_rows_type), intent(inout) :: self
-      !> Origin [m], force and law at attaching, and number of contacts
-      real(wp), intent(in) :: origin, force, weight
+      !> Origin [m], force, factor of the thresholds and law at attaching, and number of contacts
+      real(wp), intent(in) :: origin, force, factor, weight
       integer, intent(in) :: law
       !> Threshold below which contacts have broken before, or distance for those of a table
       real(wp), intent(in) :: broken
@@ -144,6 +155,7 @@ contains
       else
          call self%moments(law)%interpolate(broken, moments)
       end if
+      moments(lost) = factor**2 * moments(lost)
       associate (row => self%count, population => self%population)
          population(row, column_origin) = origin
          population(row, column_force) = force
@@ -152,6 +164,7 @@ contains
          population(row, column_broken) = max(broken, self%first_broken)
          population(row, column_birth) = birth
          population(row, column_level) = no_level
+         if (self%has_track) population(row, column_factor) = factor
          self%left(:, row) = weight * moments
          if (self%has_table) then
             population(row, column_ahead) = origin + self%stretch * ahead
@@ -174,7 +187,7 @@ contains
       integer :: stat
 
       if (self%count < size(self%population, 1)) return
-      allocate (population(2 * self%count, population_length), source=0.0_wp, stat=stat)
+      allocate (population(2 * self%count, size(self%population, 2)), source=0.0_wp, stat=stat)
       if (stat == 0) allocate (left(moments_length, 2 * self%count), source=0.0_wp, stat=stat)
       if (stat == 0 .and. allocated(self%kept)) then
          allocate (kept(size(self%kept, 1), 2 * self%count), source=0.0_wp, stat=stat)
@@ -208,6 +221,14 @@ contains
       threshold = self%population(row, column_broken)
       if (self%ages) threshold = self%ageing%threshold(threshold, 1.0_wp, &
          & time - self%population(row, column_birth))
+      if (self%has_track) then
+         associate (factor => self%population(row, column_factor))
+            displacement = self%population(row, column_origin) + direction * self%stretch * factor &
+               & * breaking_distance(self%parameters%coupling, &
+               & direction * self%population(row, column_force) / factor, threshold)
+         end associate
+         return
+      end if
       displacement = self%population(row, column_origin) + direction * self%stretch &
          & * breaking_distance(self%parameters%coupling, &
          & direction * self%population(row, column_force), threshold)

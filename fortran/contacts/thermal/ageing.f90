@@ -52,8 +52,8 @@ module mesoslip_contacts_thermal_ageing
       logical, private :: is_start = .false.
    contains
       procedure :: initialize, offer, plan, begin_life, accepts_break, update_bounds, rebuild, &
-         & records, exchange
-      procedure, non_overridable, private :: set_bound, renew_bound, threshold
+         & records, exchange, limit_at_birth
+      procedure, non_overridable, private :: set_bound, renew_bound, threshold, mean_of
    end type thermal_ageing_contacts_type
 
 contains
@@ -80,7 +80,8 @@ contains
          call raise(error, status_memory, "not enough memory for the ages of contacts")
          return
       end if
-      call new_break_tree(self%order_renewal, common%count, error)
+      call self%births%record_factors(self%parameters, error)
+      if (.not. allocated(error)) call new_break_tree(self%order_renewal, common%count, error)
       call move_alloc(self, contacts)
    end subroutine make_thermal_ageing_contacts
 
@@ -132,9 +133,28 @@ contains
       real(wp), intent(in) :: time
       real(wp) :: threshold
 
-      threshold = self%ageing%threshold(self%age(age_limit, contact), self%stretch, &
+      threshold = self%ageing%threshold(self%age(age_limit, contact), self%mean_of(contact), &
          & time - self%age(age_birth, contact))
    end function threshold
+
+   !> Mean configured breaking stretch at the place on the track where a contact attached [m].
+   pure function mean_of(self, contact) result(mean)
+      class(thermal_ageing_contacts_type), intent(in) :: self
+      integer, intent(in) :: contact
+      real(wp) :: mean
+
+      mean = self%stretch
+      if (allocated(self%births%factor)) mean = mean * self%births%factor(contact)
+   end function mean_of
+
+   !> A threshold that falls must not detach the contact later.
+   pure function limit_at_birth(self, limit) result(newborn)
+      class(thermal_ageing_contacts_type), intent(in) :: self
+      real(wp), intent(in) :: limit
+      real(wp) :: newborn
+
+      newborn = self%ageing%newborn_threshold(limit, self%stretch)
+   end function limit_at_birth
 
    !> Set the lower bound on the threshold of a contact, and the time of its renewal.
    subroutine set_bound(self, contact, pose)
@@ -148,13 +168,13 @@ contains
       self%record(row_limit, contact) = here
       self%age(age_renewal, contact) = never
       associate (age => self%age(:, contact))
-         if (self%ageing%falls(age(age_limit), self%stretch) &
+         if (self%ageing%falls(age(age_limit), self%mean_of(contact)) &
             & .and. here > age(age_limit)) then
             gap = here - abs(pose%displacement - self%record(row_origin, contact))
             gap = min(max_drop / self%hazard%slope, &
                & max_gap_part * max(gap, tiny_gap * self%stretch))
             if (here - gap > age(age_limit)) then
-               deficit = self%ageing%deficit(age(age_limit), self%stretch)
+               deficit = self%ageing%deficit(age(age_limit), self%mean_of(contact))
                age(age_renewal) = max(nearest(pose%time, huge(1.0_wp)), age(age_birth) &
                   & - self%ageing%time * log((here - gap - age(age_limit)) / (-deficit)))
                self%record(row_limit, contact) = min(here - gap, &

@@ -87,6 +87,7 @@ contains
 
       schedule%is_over = .true.
       if (self%track%columns > 0 .or. pose%direction * self%direction < 0.0_wp) return
+      if (.not. self%knows_lives()) return
       schedule%number = merge(1, 2, self%direction > 0.0_wp)
       if (self%members(schedule%number) == 0) return
       length = min(limit, self%max_length)

@@ -165,7 +165,8 @@ contains
 
       stretch = pose%displacement - self%record(row_origin, contact)
       ! To the last digit as in a schedule.
-      if (.not. allocated(self%births%force)) stretch = pose%direction &
+      if (.not. (allocated(self%births%force) .or. self%parameters%keeps_thresholds)) &
+         & stretch = pose%direction &
          & * self%parameters%back_force_ratio * self%parameters%static_force &
          & / self%record(row_stiffness, contact)
       self%life(life_clock, contact) = merge(1.0_wp, 2.0_wp, self%direction > 0.0_wp)
@@ -184,7 +185,8 @@ contains
       integer :: number, event, contact(max_events)
 
       schedule%is_over = .true.
-      if (self%track%columns > 0) return
+      ! With a track it is not known before where contacts attach, nor thus where they break.
+      if (self%track%columns > 0 .or. self%parameters%strength%is_used) return
       call self%order(self%ahead)%preview(min(limit, max_events), self%steady_listed, &
          & schedule%break_coordinate, number)
       if (number == 0) return
@@ -251,7 +253,8 @@ contains
             self%record(row_limit, contact) = self%next(next_limit, contact)
             key = self%next(next_key, contact)
             ! As for a contact that attaches outside a schedule, whose force is not known before.
-            if (allocated(self%births%force)) key = self%breaking_stretch(self%next(next_limit, &
+            if (allocated(self%births%force) .or. self%parameters%keeps_thresholds) &
+               & key = self%breaking_stretch(self%next(next_limit, &
                & contact), self%direction * (schedule%attach_displacement(event) &
                & - self%record(row_origin, contact)), self%life(life_next, contact))
             self%life(:, contact) = [merge(1.0_wp, 2.0_wp, self%direction > 0.0_wp), 0.0_wp, &

@@ -322,7 +322,7 @@ def _sliding(config: Config) -> Config:
     tables["run"] = {"seed": config.run.seed, "duration": 1.0}
     tables["drive"] = {"velocity": length}
     tables["slider"] = {"kind": "prescribed"}
-    tables["contacts"] |= {"delay": 0.0, "drag_rate": 0.0, "initial": "relaxed"}
+    tables["contacts"] |= {"delay": 0.0, "drag": 0.0, "drag_rate": 0.0, "initial": "relaxed"}
     tables["output"] = {"interval": 1 / SAMPLES}
     return Config.from_dict(tables, "slow sliding")
 

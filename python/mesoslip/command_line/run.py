@@ -162,6 +162,8 @@ def _report_results(results: Results, config: Config, path: Path) -> None:
         say(f"{path}: no contact broke: the drive did not move far enough")
     if known["audit"] != "passed":
         say(f"{path}: warning: {known['audit']}")
+    if config.contacts.weak_track is not None:
+        say(f"{path}: warning: {config.contacts.weak_track}")
     if config.unreached_drive is not None:
         say(f"{path}: warning: {config.unreached_drive}")
     unreached = _unreached_conditions(results, config)

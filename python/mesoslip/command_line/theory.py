@@ -53,6 +53,7 @@ def info(config: ConfigArgument, changes: SetOption = None, as_json: JsonOption 
         checked.unreached_drive,
         checked.continued_drive,
         checked.unreachable_stop,
+        checked.contacts.weak_track,
     ):
         if message is not None:
             typer.echo(message)

@@ -44,6 +44,7 @@ CONTINUED = (
     "slider.damping",
     "slider.damping_ratio",
     "contacts.delay",
+    "contacts.drag",
     "contacts.drag_rate",
     "contacts.back_force_ratio",
     "contacts.threshold.relative_width",

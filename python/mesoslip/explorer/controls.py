@@ -202,6 +202,7 @@ CONTROLS = (
     Control("contacts.delay", "delay τ_d", 2, usual=1e-3),
     Control("contacts.back_force_ratio", "back force f_b/f_s", range=(0, 0.9)),
     Control("contacts.drag_rate", "drag rate η", 5, usual=1e11),
+    Control("contacts.drag", "drag Nmη", 5, usual=1e-4),
     Control("contacts.coupling", "coupling", choices=RULES),
     Control("contacts.initial", "at the start", choices=tuple(INITIAL_STATES)),
     Control("contacts.threshold.law", "law", choices=WIDTH_LAWS),

@@ -10,6 +10,7 @@ SYMBOLS = {
     "contacts.stiffness": "$Nk$",
     "contacts.back_force_ratio": "$f_b/f_s$",
     "contacts.count": "$N$",
+    "contacts.drag": r"$Nm\eta$",
     "contacts.drag_rate": r"$\eta$",
     "contacts.thermal.force_ratio": "$f_T/f_s$",
     "contacts.thermal.rate": r"$\omega_0$",

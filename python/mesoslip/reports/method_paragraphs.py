@@ -11,7 +11,7 @@ from functools import singledispatch
 from typing import TYPE_CHECKING
 
 from mesoslip.configuration.config import Config
-from mesoslip.configuration.contacts.tables import Ageing, Interaction, Thermal
+from mesoslip.configuration.contacts.tables import Ageing, Interaction, Thermal, Track
 from mesoslip.configuration.drive import Drive
 from mesoslip.configuration.keys import key_kind
 from mesoslip.configuration.sliders.base import SliderTable
@@ -235,7 +235,9 @@ def _lives(config: Config) -> str:
     if not contacts.reattach:
         return "A contact that reaches its threshold breaks for good."
     drag = ""
-    if contacts.drag_rate and not config.slider.ignores_delay:
+    if contacts.drag and not config.slider.ignores_delay:
+        drag = f"is dragged (all together: Nmη = {quantity(contacts.drag, 'N s/m')}), "
+    elif contacts.drag_rate and not config.slider.ignores_delay:
         drag = f"is dragged at the rate η = {quantity(contacts.drag_rate, '1/s')}, "
     wait = "at once"
     if contacts.delay and not config.slider.ignores_delay:
@@ -284,6 +286,20 @@ def _thermal(thermal: Thermal, key: str, config: Config) -> str:  # noqa: ARG001
         f"[@barel2010; @braun2011temperature], ω_0 = {rate}, f_T = "
         f"{quantity(ratio, '1')} f_s."
     )
+
+
+@feature_sentence.register
+def _track(track: Track, key: str, config: Config) -> str:  # noqa: ARG001
+    return (
+        "The thresholds of contacts that attach where the slider is at X are multiplied by "
+        f"1 + w g(X), a Gaussian function of mean 1 with w = {track.spread:g} and a correlation "
+        f"that is {track.correlation}, of length {quantity(track.length, 'm')}."
+    )
+
+
+@feature_sentence.register
+def _renewal(renewal: str, key: str, config: Config) -> str:  # noqa: ARG001
+    return "A contact keeps its threshold in all its lives."
 
 
 @feature_sentence.register

@@ -45,4 +45,5 @@ def contact_kind(
 def is_in_both_engines(given: frozenset[str]) -> bool:
     """Whether each engine has a kind of contacts that answers all given keys."""
     features = given - COMMON_KEYS
-    return {kind.engine for kind in KINDS if kind.features == features} == {"eq", "me"}
+    answers = (one for one in KINDS if one.features <= features <= one.features | one.options)
+    return {kind.engine for kind in answers} == {"eq", "me"}

@@ -23,8 +23,8 @@ COMMON_KEYS = frozenset(
     f"contacts.{key}"
     for key in (
         *("count", "static_force", "stiffness", "area", "film_thickness", "film_density"),
-        *("drag_rate", "delay", "delay_law", "back_force_ratio", "newborn_width", "coupling"),
-        *("initial", "reattach", "threshold"),
+        *("drag", "drag_rate", "delay", "delay_law", "back_force_ratio", "newborn_width"),
+        *("coupling", "initial", "reattach", "threshold"),
     )
 )
 
@@ -64,7 +64,9 @@ class ContactKind(ABC):
     engine
         The engine that simulates it.
     features
-        Keys and tables beyond the common ones that it answers, such as "contacts.ageing".
+        Keys and tables beyond the common ones that make it, such as "contacts.ageing".
+    options
+        Further keys and tables that it answers where they are given.
     is_discrete
         Whether contacts are counted in whole numbers.
     has_neighbours
@@ -73,8 +75,6 @@ class ContactKind(ABC):
         Whether contacts have sites on a lattice.
     bytes_per_contact
         Memory of a realization per contact.
-    max_realizations
-        Maximum number of realizations that differ from each other.
     residual_bound
         Maximum residual of the energy balance, relative to the work of the drive.
     step_work_bound
@@ -88,9 +88,9 @@ class ContactKind(ABC):
     kernel_kind: ClassVar[str]
     engine: ClassVar[str]
     features: ClassVar[frozenset[str]] = frozenset()
+    options: ClassVar[frozenset[str]] = frozenset({"contacts.renewal", "contacts.track"})
     is_discrete: ClassVar[bool] = True
     has_neighbours: ClassVar[bool] = False
-    max_realizations: ClassVar[int] = 2**31 - 1
     residual_bound: ClassVar[float] = 1e-9
     step_work_bound: ClassVar[float] = 0.0
     force_error_bound: ClassVar[float] = 0.0
@@ -137,7 +137,7 @@ class ContactKind(ABC):
         """The combinations that this kind refuses, and the given keys that it does not answer."""
         complaints = list(self._problems(config))
         yield from complaints
-        for key in sorted(given - COMMON_KEYS - self.features):
+        for key in sorted(given - COMMON_KEYS - self.features - self.options):
             if not any(f"{one.key}.".startswith(f"{key}.") for one in complaints):
                 yield Complaint(
                     key, f'is not known to contacts of the kind "{self.kernel_kind}": leave it out'
@@ -175,4 +175,18 @@ def common_parameters(config: Setting) -> Parameters:
         "coupling": contacts.coupling,
         "reattach": int(contacts.reattach),
         **contacts.threshold.kernel_parameters,
+        **_kept(contacts),
+        **_track(contacts),
     }
+
+
+def _kept(contacts: Contacts) -> Parameters:
+    """Parameters of contacts that keep their thresholds."""
+    return {} if contacts.renewal == "redraw" else {"keeps_thresholds": 1}
+
+
+def _track(contacts: Contacts) -> Parameters:
+    """Parameters of the strength along a track."""
+    if contacts.track is None:
+        return {}
+    return contacts.track.kernel_parameters(contacts.strength_floor)

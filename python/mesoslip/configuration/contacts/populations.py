@@ -22,7 +22,7 @@ class PopulationContacts(ContactKind):
     is_discrete: ClassVar[bool] = False
     on_lattice: ClassVar[bool] = False
     bytes_per_contact: ClassVar[int] = 0
-    max_realizations: ClassVar[int] = 1
+    options: ClassVar[frozenset[str]] = frozenset({"contacts.track"})
     residual_bound: ClassVar[float] = 1e-6
     step_work_bound: ClassVar[float] = 1e-3
     force_error_bound: ClassVar[float] = 0.02
@@ -43,11 +43,24 @@ class PopulationContacts(ContactKind):
                 "interaction acts like a smaller contacts.threshold.relative_width: "
                 "mesoslip mean-field measures it",
             )
-        if run.realizations > self.max_realizations:
+        if run.realizations > 1 and config.contacts.track is None:
             yield Complaint(
                 "run.realizations",
-                'must be 1 with engine "me", which has no random numbers',
+                'must be 1 with engine "me", which has no random numbers without contacts.track',
                 run.realizations,
+            )
+        if config.contacts.renewal != "redraw":
+            yield Complaint(
+                "contacts.renewal",
+                'must be "redraw" with engine "me": its populations are contacts that attach at '
+                "one place, which would have to be told apart by all thresholds that they keep",
+                config.contacts.renewal,
+            )
+        if config.contacts.track is not None and config.contacts.coupling == "table":
+            yield Complaint(
+                "contacts.track",
+                'is not for contacts.coupling = "table" with engine "me", which tabulates their '
+                "lives for one strength",
             )
         width = config.contacts.newborn_width
         max_width = MAX_NEWBORN_RATIO * config.contacts.threshold.relative_width

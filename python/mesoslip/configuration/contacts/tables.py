@@ -17,6 +17,7 @@ from mesoslip.configuration.table import (
     Complaint,
     Complaints,
     Density,
+    Drag,
     Force,
     Length,
     Number,
@@ -41,6 +42,7 @@ from mesoslip.configuration.threshold_laws.table import (
     stretch_cells,
 )
 from mesoslip.errors import FileError
+from mesoslip.quantities import with_unit
 
 Array = NDArray[np.float64]
 
@@ -49,6 +51,8 @@ COUPLINGS = ("scaled", "equal", "table")
 SAMPLE_KEYS = ("samples", "weights", "stiffnesses")
 DELAY_LAWS = ("fixed", "exponential")
 AGEING_LAWS = ("relax", "log")
+CORRELATIONS = ("gaussian", "exponential")
+RENEWALS = ("redraw", "keep")
 INITIAL_STATES = ("relaxed", "steady", "uniform")
 LATTICES = ("triangular", "square")
 
@@ -57,6 +61,15 @@ NEIGHBOURS = {"triangular": 6, "square": 4}
 
 # Minimum fraction of thresholds above the back force; with less, drawing them takes too long.
 MIN_ACCEPTED = 0.5
+
+# Minimum factor of thresholds on a track, and probability of a threshold that can attach anywhere
+# on it.
+MIN_STRENGTH, STRONG_PART = 0.05, 0.01
+# Part of a track with the minimum factor of which there is a message.
+MIN_CUT_SHARE = 1e-4
+# Minimum correlation length of a track over the mean breaking stretch: the contacts of a slider
+# attached along a breaking stretch, over which shorter variations average out.
+MIN_LENGTH_RATIO = 0.1
 
 # Keys of [contacts.ageing] that belong to one law each.
 AGEING_KEYS = {"relax": ("young_force_ratio", "young_relative_width"), "log": ("growth",)}
@@ -295,6 +308,33 @@ class Thermal(Table):
         return self.rate * math.exp((force_ratio - 1) / self.ratio(contact_static_force))
 
 
+class Track(Table):
+    """Strength of the interface along the track of the slider (model section 18).
+
+    The threshold of a contact that attaches while the slider is at X is multiplied by 1 + w g(X).
+    g is Gaussian, with mean 0 and variance 1, and another function for each realization. The same X
+    meets the same strength in each stroke. Contacts at the start have the strength of X = 0.
+    """
+
+    spread: Annotated[Number, Field(gt=0, le=1)]
+    """Standard deviation of the strength relative to its mean, w. The factor is at least 0.05, and
+    at least so high that a hundredth of the thresholds exceeds the back force."""
+    length: Annotated[Length, Field(gt=0)]
+    """Correlation length l, at least a tenth of the breaking stretch F_s/(N k)."""
+    correlation: Annotated[str, choice(CORRELATIONS)] = "gaussian"
+    """Correlation of the strength at two places ΔX apart: `gaussian`, exp(−(ΔX/l)²/2), which is
+    smooth; `exponential`, exp(−|ΔX|/l), which is rough at all scales."""
+
+    def kernel_parameters(self, floor: float) -> Parameters:
+        """Parameters of the track in the kernel, with the minimum factor."""
+        return {
+            "track_spread": self.spread,
+            "track_length": self.length,
+            "track_floor": floor,
+            "track_correlation": self.correlation,
+        }
+
+
 class Contacts(Table):
     """The contacts of the interface; forces, stiffness and area are totals of all contacts."""
 
@@ -316,13 +356,17 @@ class Contacts(Table):
     drag_rate: Annotated[Rate, Field(ge=0)] = 0.0
     """Rate η of the drag m η V of a detached contact; needs area, film_thickness and
     film_density."""
+    drag: Annotated[Drag, Field(ge=0)] = 0.0
+    """Drag of all contacts together over the velocity, if all were detached, N m η; in place of
+    `drag_rate` where no film is known."""
     delay: Annotated[Time, Field(ge=0)] = 0.0
     """Time between detaching and attaching again, τ_d."""
     delay_law: Annotated[str, choice(DELAY_LAWS)] = "fixed"
     """`fixed`: all contacts wait for the same delay; `exponential`: each delay is drawn from the
     exponential law, whose mean is `delay`."""
     back_force_ratio: Annotated[Number, Field(ge=0, lt=1)] = 0.0
-    """Force at which a contact attaches, relative to the mean threshold, f_b/f_s."""
+    """Force at which a contact attaches, relative to the mean threshold, f_b/f_s; with `renewal`
+    "keep", relative to its own threshold."""
     newborn_width: Annotated[Number, Field(ge=0, le=0.25)] = 0.0
     """Standard deviation of the force at which contacts attach, relative to the mean threshold. The
     force is normal, and drawn again with the threshold where it is not below that."""
@@ -342,6 +386,12 @@ class Contacts(Table):
     """Change of the thresholds with age; none by default."""
     thermal: Thermal | None = None
     """Thermally activated breaking; none by default."""
+    track: Track | None = None
+    """Strength that varies along the track of the slider; none by default."""
+    renewal: Annotated[str, choice(RENEWALS)] = "redraw"
+    """`redraw`: a contact draws its threshold each time it attaches, as a junction does; `keep`: it
+    keeps the first one in all its lives, as an asperity does, and attaches under the part
+    `back_force_ratio` of it."""
 
     @model_validator(mode="after")
     def _stiffnesses_of_the_table(self) -> Self:
@@ -364,6 +414,12 @@ class Contacts(Table):
 
     @model_validator(mode="after")
     def _mass_for_drag(self) -> Self:
+        if self.drag_rate > 0 and self.drag > 0:
+            raise problem(
+                "drag",
+                "give either drag or drag_rate (0 or left out): both determine the drag of "
+                "detached contacts",
+            )
         if self.drag_rate > 0:
             for key in ("area", "film_thickness", "film_density"):
                 if getattr(self, key) is None:
@@ -382,6 +438,40 @@ class Contacts(Table):
             )
         return self
 
+    @model_validator(mode="after")
+    def _track_that_is_felt(self) -> Self:
+        if self.track is not None and self.track.length < MIN_LENGTH_RATIO * self.break_stretch:
+            raise problem(
+                "track.length",
+                f"must be at least {with_unit(MIN_LENGTH_RATIO * self.break_stretch, 'm')}, a tenth "
+                "of the breaking stretch F_s/(N k): contacts that are pinned at one time attached "
+                "along a breaking stretch, so that shorter variations of the strength average out",
+            )
+        return self
+
+    @property
+    def strength_floor(self) -> float:
+        """Minimum factor of the thresholds on a track: some contacts can attach anywhere."""
+        if self.renewal == "keep":
+            return MIN_STRENGTH
+        strong = self.threshold.above(0.0).quantile([STRONG_PART])
+        weakest = min(float(strong[0]), float(self.threshold_at(strong, 0.0)[0]))
+        return max(MIN_STRENGTH, self.back_force_ratio / weakest)
+
+    @property
+    def weak_track(self) -> str | None:
+        """A message if part of the track is so weak that its strength is cut off; else None."""
+        if self.track is None:
+            return None
+        floor = self.strength_floor
+        share = 0.5 * math.erfc((1 - floor) / (math.sqrt(2) * self.track.spread))
+        if share < MIN_CUT_SHARE:
+            return None
+        return (
+            f"contacts.track.spread = {self.track.spread:g}: on {100 * share:.2g} % of the track the "
+            f"strength is cut off at {floor:.3g} of its mean"
+        )
+
     @property
     def _of_the_young(self) -> str:
         """Part of a message: thresholds of young contacts, if those are what is too low."""
@@ -391,10 +481,12 @@ class Contacts(Table):
     def min_threshold(self) -> float:
         """Configured relative threshold at or below which a contact cannot attach, or would detach
         by itself."""
+        # The force at attaching is below a threshold of which it is a part.
+        back = 0.0 if self.renewal == "keep" else self.back_force_ratio
         if self.ageing is None:
-            return self.back_force_ratio
-        young = self.ageing.configured(self.back_force_ratio, self.threshold.relative_width, 0.0)
-        return max(self.back_force_ratio, young)
+            return back
+        young = self.ageing.configured(back, self.threshold.relative_width, 0.0)
+        return max(back, young)
 
     def threshold_at(self, configured: Array, age: ArrayLike) -> Array:
         """Thresholds at an age [s], from the configured ones; both relative to the static force."""
@@ -430,7 +522,7 @@ class Contacts(Table):
     @property
     def contact_drag(self) -> float:
         """m η [N s/m]."""
-        return self.contact_mass * self.drag_rate
+        return self.drag / self.count if self.drag > 0 else self.contact_mass * self.drag_rate
 
     @property
     def stretch_width(self) -> float:

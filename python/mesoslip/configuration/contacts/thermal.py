@@ -131,6 +131,7 @@ class ThermalPopulations(PopulationContacts):
 
     kernel_kind: ClassVar[str] = "thermal populations"
     features: ClassVar[frozenset[str]] = frozenset({"contacts.thermal"})
+    options: ClassVar[frozenset[str]] = frozenset()
     # A slider that hardly oscillates is taken to creep: what energy it oscillates with is lost.
     residual_bound: ClassVar[float] = 1e-5
 
@@ -141,6 +142,12 @@ class ThermalPopulations(PopulationContacts):
         yield from super()._problems(config)
         # PopulationContacts refuses interaction already.
         yield from (one for one in thermal_problems(config) if one.key != "interaction.strength")
+        if config.contacts.track is not None:
+            yield Complaint(
+                "contacts.track",
+                'is not for contacts.thermal with engine "me", which tabulates the survivors of '
+                'activation for one strength: run.engine = "eq" has both',
+            )
         if config.contacts.initial == "uniform":
             yield Complaint(
                 "contacts.initial",

@@ -19,8 +19,8 @@ KNOWN_KEYS = frozenset(
     f"contacts.{key}"
     for key in (
         *("count", "static_force", "stiffness", "area", "film_thickness", "film_density"),
-        *("drag_rate", "delay", "delay_law", "back_force_ratio", "newborn_width", "coupling"),
-        *("initial", "reattach", "threshold"),
+        *("drag", "drag_rate", "delay", "delay_law", "back_force_ratio", "newborn_width"),
+        *("coupling", "initial", "reattach", "threshold"),
     )
 )
 

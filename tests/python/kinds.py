@@ -196,6 +196,13 @@ KINDS: dict[str, dict[str, Any]] = {
     },
 }
 
+# Those between which outputs, and with them reports and pictures, differ.
+DIFFERENT = {
+    *("rigid", "rigid, three realizations", "rigid, bundle", "rigid, lattice", "rigid, me"),
+    *("rigid, to a slip", "rigid, ageing, ramps", "prescribed, ramps", "layered", "layered, me"),
+    *("quasistatic, lattice", "quasistatic, force", "force", "rigid, thermal"),
+}
+
 
 def configuration(kind: str, **changes: Any) -> Config:
     """The short run of a kind, with changes."""

@@ -15,7 +15,7 @@ from conftest import klein_tables, long
 from mesoslip.errors import ConfigError, FileError
 from mesoslip.execution.stop import Stop, StoppedError
 from mesoslip.execution.store import Store
-from mesoslip.inference import checks, fit_trace, likelihood, sampler
+from mesoslip.inference import checks, fit_trace, likelihood, rounds, sampler
 from mesoslip.inference.features import Feature
 from mesoslip.inference.fit_plan import Plan
 from mesoslip.inference.prior import FreeParameter, Prior
@@ -39,12 +39,17 @@ SMALL = {
     "output__interval": 2e-3,
 }
 NOISE = 5e-8
+# Simulations of a whole fit.
+FEW = 150
 
 
 @contextmanager
-def few_draws():
-    """Fits with short chains and few predictions: enough for what is tested of whole fits."""
+def few_simulations():
+    """Fits with few simulations, short chains and few predictions, for tests of whole fits."""
     with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("mesoslip.inference.fit_plan.MIN_SIMULATIONS", FEW)
+        patch.setattr(rounds, "MIN_FIRST", 50)
+        patch.setattr(rounds, "MIN_NEXT", 30)
         patch.setattr(sampler, "BURN_IN", 60)
         patch.setattr(sampler, "THIN", 4)
         patch.setattr("mesoslip.inference.fit.PREDICTIONS", 60)
@@ -107,7 +112,10 @@ def linear_problem(seed, total=400):
 @pytest.fixture(scope="module", params=[(0, 1, 4, 5), long(range(14))])
 def linear_problems(request):
     """Some of them, for what is tested of them together; of the few, three are far from bounds."""
-    return [linear_problem(seed) for seed in request.param]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sampler, "BURN_IN", 80)
+        patch.setattr(sampler, "THIN", 5)
+        return [linear_problem(seed) for seed in request.param]
 
 
 def test_a_normal_problem_has_its_exact_posterior(linear_problems):
@@ -307,8 +315,10 @@ def small_fit(tmp_path_factory):
     """The trace of the small experiment, and its posterior."""
     folder = tmp_path_factory.mktemp("fit")
     tree = experiment()
-    with few_draws():
-        posterior = mesoslip.fit(tree, fit_tables(), store=folder / "kept", executor=1)
+    with few_simulations():
+        posterior = mesoslip.fit(
+            tree, fit_tables(simulations=FEW), store=folder / "kept", executor=1
+        )
     return tree, posterior, folder
 
 
@@ -323,7 +333,7 @@ def test_the_truth_lies_in_the_posterior(small_fit):
         assert high < 1.7 * low
     assert posterior["posterior"]["contacts.static_force"].attrs["units"] == "N"
     assert not posterior.attrs["warnings"] or "describe" not in posterior.attrs["warnings"]
-    assert posterior.attrs["simulation_count"] == 300
+    assert posterior.attrs["simulation_count"] == FEW
 
 
 def test_a_report_reports_the_parameters(small_fit, tmp_path):
@@ -352,14 +362,14 @@ def test_the_same_seed_gives_the_same_posterior(small_fit):
         if part > 0.4:
             stop.set()
 
-    store = folder / "stopped"
-    with few_draws(), pytest.raises(StoppedError):
-        mesoslip.fit(tree, fit_tables(), store=store, executor=2, progress=watch, stop=stop)
+    store, tables = folder / "stopped", fit_tables(simulations=FEW)
+    with few_simulations(), pytest.raises(StoppedError):
+        mesoslip.fit(tree, tables, store=store, executor=2, progress=watch, stop=stop)
     assert store.exists()
     again = []
-    with few_draws():
+    with few_simulations():
         resumed = mesoslip.fit(
-            tree, fit_tables(), store=store, executor=2, progress=lambda part: again.append(part)
+            tree, tables, store=store, executor=2, progress=lambda part: again.append(part)
         )
     assert len(again) < 0.85 * len(again + done)
     for key in FREE:
@@ -401,8 +411,8 @@ def test_simulations_of_another_fit_are_refused(small_fit):
 def test_another_mass_is_no_part_of_the_model():
     """The waveform of slips of a trace of four times the mass disagrees."""
     tree = experiment(slider__mass=4 * 1.47e-3)
-    with few_draws():
-        posterior = mesoslip.fit(tree, fit_tables())
+    with few_simulations():
+        posterior = mesoslip.fit(tree, fit_tables(simulations=FEW))
     assert posterior.attrs["agreement_probability"] < checks.REJECTED
     assert "no parameters in the ranges describe the trace" in posterior.attrs["warnings"]
 
@@ -474,9 +484,9 @@ def test_the_command_fits_and_draws(tmp_path, command, monkeypatch):
     assert command("trace", trace, "--rate", "500 1/s", "-o", output)[0] == 0
     import tomli_w
 
-    config.write_text(tomli_w.dumps(fit_tables()))
+    config.write_text(tomli_w.dumps(fit_tables(simulations=FEW)))
     posterior = tmp_path / "posterior.nc"
-    with few_draws():
+    with few_simulations():
         status, printed, _ = command("fit", output, config, "-o", posterior, "--quiet")
     assert status == 0
     assert "contacts.static_force" in printed
@@ -490,7 +500,8 @@ def test_the_command_fits_and_draws(tmp_path, command, monkeypatch):
     # The same posterior, which is not computed again.
     again = mesoslip.open_output(posterior)
     monkeypatch.setattr(fit_trace, "fit", lambda *_, **__: again)
-    status, printed, _ = command("fit", output, config, "-o", posterior, "--quiet", "--json")
+    with few_simulations():
+        status, printed, _ = command("fit", output, config, "-o", posterior, "--quiet", "--json")
     assert status == 0
     row = json.loads(printed)["parameters"]["contacts.delay"]
     assert row["interval_90"][0] < row["median"] < row["interval_90"][1]

@@ -23,7 +23,7 @@ from mesoslip.inference.noise import Noise, cleaned
 from mesoslip.inference.simulations import Simulations
 from mesoslip.inference.traced_experiment import Sampling, prepare
 from mesoslip.inference.wander import wandering
-from test_fit import FREE, NOISE, SMALL, experiment, few_draws, fit_tables
+from test_fit import FREE, NOISE, SMALL, experiment, few_simulations, fit_tables
 
 TRUTH = {"contacts.static_force": 18e-6, "contacts.delay": 1e-3}
 
@@ -239,8 +239,9 @@ def two_traces(tmp_path_factory):
         from mesoslip.output.writing import write
 
         write(tree, paths[-1])
-    with few_draws():
-        return paths, mesoslip.fit(paths, fit_tables(free=FREE | STIFFNESS), executor=1)
+    with few_simulations():
+        tables = fit_tables(free=FREE | STIFFNESS, simulations=200)
+        return paths, mesoslip.fit(paths, tables, executor=1)
 
 
 def test_several_traces_share_their_free_parameters(two_traces):

@@ -116,12 +116,12 @@ def test_static_friction_is_the_maximum_of_the_force_curve(klein):
     stages = [
         {"duration": 0.5, "start_force": 0.0, "end_force": 2e-6},
         {"duration": 0.3, "force": 1e-6},
-        {"duration": 2.0, "start_force": 1e-6, "end_force": 1.8e-5},
+        {"duration": 1.6, "start_force": 1e-6, "end_force": 1.46e-5},
     ]
     config = klein(
         slider=SLIDER,
         drive={"stage": stages},
-        run={"duration": 2.8, "realizations": 2},
+        run={"duration": 2.4, "realizations": 2},
         contacts__coupling="equal",
         contacts__threshold__relative_width=0.2,
     )

@@ -112,7 +112,7 @@ def test_steps_are_of_second_order_through_reversals(klein, delay, back_force_ra
                 contacts__coupling="equal",
             )
         ).trace[:, 5]
-        for resolution in (0.03125, 0.5, 0.125)
+        for resolution in (0.0625, 0.5, 0.125)
     ]
     coarse, fine = (np.max(np.abs(trace - traces[0])) / FORCE for trace in traces[1:])
     assert fine < 1.5e-3
@@ -202,14 +202,16 @@ def test_the_delay_weakens_the_force(klein, law, velocity):
     assert np.mean(late[:, 5]) == pytest.approx(stationary_force(config, velocity), rel=2e-4)
 
 
-@pytest.mark.parametrize("coupling", ["scaled", "equal"])
-def test_many_contacts_tend_to_it(klein, coupling):
+@pytest.mark.parametrize(
+    ("coupling", "counts"), [("scaled", (100, 10_000, 1_000_000)), ("equal", (1000, 100_000))]
+)
+def test_many_contacts_tend_to_it(klein, coupling, counts):
     """Reversals, delay and drag: what N contacts differ by falls as N^(-1/2)."""
     exact = finish(
         back_and_forth(klein, run__engine="me", run__resolution=0.0625, contacts__coupling=coupling)
     ).trace[:, 5]
     scaled = []
-    for count in (100, 1000, 10_000, 100_000, 1_000_000):
+    for count in counts:
         config = back_and_forth(klein, contacts__count=count, contacts__coupling=coupling)
         error = finish(config).trace[:, 5] - exact
         scaled.append(np.sqrt(np.mean(error**2) * count) / FORCE)

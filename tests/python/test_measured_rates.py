@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -23,10 +24,12 @@ from mesoslip.analysis.rate_and_state import (
 )
 from mesoslip.analysis.rate_and_state.noise import estimated_noise
 from mesoslip.analysis.rate_and_state.rows import _row
-from mesoslip.analysis.response import response, rows_of, tables
+from mesoslip.analysis.response import rows_of, tables
 from mesoslip.measured.load_point import drive_stages
 from mesoslip.measured.output_groups import stage_group
 from mesoslip.output import writing
+from mesoslip.output.arrays import in_xarray
+from mesoslip.plots import measured_response
 from oracles import Friction, spring_slider
 
 UM = 1e-6
@@ -64,8 +67,8 @@ def trace(law=LAW, stages=STEP, noise=3e-4, rate=10.0, *, trend=0.0, known=True,
 
 
 def row_of(tree, law, **options):
-    rows = fit_rows(Experiment(tree), 0, laws=("ageing", "slip"), **options)
-    return next(one for one in rows if one["law"] == law)
+    (row,) = fit_rows(Experiment(tree), 0, laws=(law,), **options)
+    return row
 
 
 def check(row, law=LAW):
@@ -201,8 +204,10 @@ def test_errors_know_of_correlated_noise():
 
 def test_the_response_of_a_trace_of_coefficients(tmp_path, command, monkeypatch):
     """Names, units and tables; commands on the file."""
-    tree = trace(trend=2e-6 / UM)
-    found = response(tree)
+    path = tmp_path / "trace.nc"
+    writing.write(trace(trend=2e-6 / UM), path)
+    arrays = responses.response_arrays(path)
+    found = in_xarray(arrays)
     rows = rows_of(found, "rate_and_state")
     assert {one["law"] for one in rows} >= {"ageing", "slip"}
     assert found["rate_and_state"]["a_coefficient"].attrs["units"] == "1"
@@ -217,8 +222,9 @@ def test_the_response_of_a_trace_of_coefficients(tmp_path, command, monkeypatch)
         "Velocity steps",
         "Rate and state",
     }
-    path = tmp_path / "trace.nc"
-    writing.write(tree, path)
+    # Fits take seconds: the commands print those that were made, and one law is drawn.
+    monkeypatch.setattr(responses, "response_arrays", lambda *_, **__: arrays)
+    monkeypatch.setattr(measured_response, "fit_laws", partial(fit_laws, laws=("slip",)))
     status, out, _ = command("response", path, "--json")
     assert status == 0
     slip = next(one for one in json.loads(out)["rate_and_state"] if one["law"] == "slip")
@@ -227,8 +233,6 @@ def test_the_response_of_a_trace_of_coefficients(tmp_path, command, monkeypatch)
         assert slip[f"{name}_error"] > 0
     assert command("plot", path, "--view", "response", "-o", tmp_path / "a.png")[0] == 0
     assert command("regime", path)[0] == 0
-    # Tables of what has been found, which is not computed again.
-    monkeypatch.setattr(responses, "response", lambda *_, **__: found)
     for option, start in (("--latex", "\\begin{tabular}"), ("--markdown", "| law |")):
         status, out, _ = command("response", path, option)
         assert status == 0

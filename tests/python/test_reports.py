@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from conftest import ROOT, klein_tables, long
-from kinds import KINDS, configuration
+from kinds import DIFFERENT, KINDS, configuration
 from mesoslip.output.kinds import KINDS as OUTPUTS
 from mesoslip.plots.views.run import caption
 from mesoslip.quantities import column
@@ -102,14 +102,6 @@ def test_a_report_of_kleins_run(klein_run, tmp_path):
     # Made again it is the same.
     again, _ = written(klein_run, tmp_path / "again.html")
     assert again == text
-
-
-# Those between which a report's sections and tables differ.
-DIFFERENT = {
-    *("rigid", "rigid, three realizations", "rigid, bundle", "rigid, lattice", "rigid, me"),
-    *("rigid, to a slip", "rigid, ageing, ramps", "prescribed, ramps", "layered", "layered, me"),
-    *("quasistatic, lattice", "quasistatic, force"),
-}
 
 
 @pytest.mark.parametrize("kind", [kind if kind in DIFFERENT else long(kind) for kind in KINDS])

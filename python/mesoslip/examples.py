@@ -93,7 +93,12 @@ def _write_new(path: Path, contents: bytes) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         # Mode x: a file of that name may have been made in the meantime.
         with path.open("xb") as stream:
-            stream.write(contents)
+            try:
+                stream.write(contents)
+                stream.flush()
+            except OSError:
+                path.unlink()
+                raise
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise FileError(f"{path}: cannot be written: {reason}") from error

@@ -18,7 +18,7 @@ from mesoslip.configuration.threshold_laws import LAWS
 from mesoslip.errors import RunError
 from mesoslip.output import variables
 from mesoslip.simulation import recorded_tables as tables
-from mesoslip.simulation.kernel import Kernel, name_list
+from mesoslip.simulation.kernel import RESERVE, Kernel, name_list
 from mesoslip.simulation.kernel_setup import configured_kernel
 from mesoslip.simulation.realization import ENDINGS
 from mesoslip.theory.lives import Scales
@@ -83,10 +83,10 @@ WITHOUT_MEMORY = """
 import resource, sys
 from pathlib import Path
 import mesoslip
-overrides = ["run.engine=me", "run.resolution=0.01", "contacts.initial=steady"]
+overrides = ["run.engine=me", "run.resolution=0.002", "contacts.initial=steady"]
 with mesoslip.Realization(mesoslip.Config.load(sys.argv[1], overrides=overrides)) as run:
     size = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
-    resource.setrlimit(resource.RLIMIT_AS, (size + 2**20, resource.RLIM_INFINITY))
+    resource.setrlimit(resource.RLIMIT_AS, (size + int(sys.argv[2]), resource.RLIM_INFINITY))
     try:
         run.advance_to(0.01)
     except mesoslip.RunError as error:
@@ -95,12 +95,19 @@ with mesoslip.Realization(mesoslip.Config.load(sys.argv[1], overrides=overrides)
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="reads the size of the process from /proc")
-def test_memory_that_is_refused_is_an_error():
-    """The kernel does not stop the program."""
-    command = [sys.executable, "-c", WITHOUT_MEMORY, str(ROOT / "runs" / "klein.toml")]
+@pytest.mark.parametrize(
+    ("room", "message"),
+    [
+        (2**16, "not enough memory for a simulation"),
+        (RESERVE + 25_000_000, "not enough memory for the populations of contacts"),
+    ],
+)
+def test_memory_that_is_refused_is_an_error(room, message):
+    """The kernel does not stop the program, as Fortran's library does for small allocations."""
+    command = [sys.executable, "-c", WITHOUT_MEMORY, str(ROOT / "runs" / "klein.toml"), str(room)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
     assert done.returncode == 0, done.stderr
-    assert "not enough memory for the populations of contacts" in done.stdout
+    assert message in done.stdout
 
 
 def with_contacts(config) -> Kernel:

@@ -104,12 +104,19 @@ def test_a_base_elsewhere_comes_to_stand_beside_the_example(tmp_path, monkeypatc
     assert 'base = "klein.toml"' in written[0].read_text()
 
 
-def test_a_missing_library_is_reported_in_a_line(monkeypatch, command):
+@pytest.mark.parametrize(
+    ("problem", "message"),
+    [
+        ("libsundials_cvode.so.6: cannot open shared object file", "libsundials-dev"),
+        ("libhdf5.so: failed to map segment from shared object", "not enough memory"),
+    ],
+)
+def test_a_missing_library_is_reported_in_a_line(problem, message, monkeypatch, command):
     def broken():
-        raise ImportError("libsundials_cvode.so.6: cannot open shared object file")
+        raise ImportError(problem)
 
     monkeypatch.setattr(examples, "examples", broken)
     status, _, errors = command("example")
     assert status == 1
-    assert "libsundials-dev" in errors
+    assert message in errors
     assert errors.count("\n") == 1

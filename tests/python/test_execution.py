@@ -96,6 +96,29 @@ def test_processes_that_cannot_start_end_the_work(monkeypatch):
         list(work)
 
 
+@pytest.mark.parametrize("started", [0, 1])
+def test_threads_that_cannot_start_do_without_or_end_the_work(started, monkeypatch):
+    """As where the memory of a process is limited: Python has an error of another kind for it."""
+
+    class Thread(threading.Thread):
+        count = 0
+
+        def start(self):
+            Thread.count += 1
+            if Thread.count > started:
+                raise RuntimeError("can't start new thread")
+            super().start()
+
+    monkeypatch.setattr(local.threading, "Thread", Thread)
+    work = completed(mesoslip.Threads(3), lambda one, _: one**2, range(8), Stop())
+    with closing(work):
+        if not started:
+            with pytest.raises(PoolError, match="a worker cannot be started"):
+                next(work)
+        else:
+            assert sorted(future.result() for _, future in work) == [n**2 for n in range(8)]
+
+
 @pytest.mark.parametrize("executor", EXECUTORS, ids=repr)
 def test_a_stop_is_answered_at_once(executor):
     stop = Stop()

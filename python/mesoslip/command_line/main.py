@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import functools
 import io
 import os
@@ -74,6 +75,9 @@ WITHOUT_XARRAY = {
 
 # How to install the libraries that the kernels are linked to.
 LIBRARIES = "Debian, Ubuntu: apt-get install gfortran libsundials-dev"
+NO_MEMORY = "mesoslip: there is not enough memory for this"
+# How the system says that there is no memory for a library.
+NOT_MAPPED = ("failed to map segment", "annot allocate memory")
 
 
 def _version(wanted: bool) -> None:
@@ -150,15 +154,21 @@ def main() -> None:
     except KeyboardInterrupt:
         status = run.INTERRUPTED
     except ImportError as error:
+        if any(one in str(error) for one in NOT_MAPPED):
+            typer.echo(NO_MEMORY, err=True)
+            sys.exit(1)
         # The kernels lack a shared library; other missing modules are bugs.
         if "shared object" not in str(error) and "Library not loaded" not in str(error):
             raise
         typer.echo(f"mesoslip: a library is missing: {error}; {LIBRARIES}", err=True)
         status = 1
     except MemoryError:
-        typer.echo("mesoslip: there is not enough memory for this", err=True)
+        typer.echo(NO_MEMORY, err=True)
         status = 1
     except OSError as error:
+        if error.errno == errno.ENOMEM:
+            typer.echo(NO_MEMORY, err=True)
+            sys.exit(1)
         status = _output_failed(error)
     finally:
         COMMAND_LINE.reset(token)

@@ -127,13 +127,24 @@ class LocalPool(Pool):
         return 2 * self._workers
 
     def submit(self, function: Function[Any, Result], piece: object) -> Future[Result]:
+        if len(self._threads) < self._workers:
+            self._start_thread()
         future: Future[Result] = Future()
         self._queue.put((future, function, piece))
-        if len(self._threads) < self._workers:
-            # Unlike those of ThreadPoolExecutor, it does not keep the interpreter from exiting.
-            self._threads.append(threading.Thread(target=self._serve, daemon=True))
-            self._threads[-1].start()
         return future
+
+    def _start_thread(self) -> None:
+        """Start one more thread; the first one must start."""
+        # Unlike those of ThreadPoolExecutor, it does not keep the interpreter from exiting.
+        thread = threading.Thread(target=self._serve, daemon=True)
+        try:
+            thread.start()
+        # Python has no error of its own for this.
+        except (MemoryError, RuntimeError):
+            if not self._threads:
+                raise PoolError("a worker cannot be started: is there enough memory?") from None
+        else:
+            self._threads.append(thread)
 
     def check(self) -> None:
         """Nothing to check: a process that cannot be started fails its piece with a `PoolError`."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import mmap
+import resource
 import threading
 import weakref
 from collections.abc import Mapping
@@ -19,6 +21,9 @@ Words = NDArray[np.int64]
 
 # Maximum number of names in a list.
 MAX_NAMES = 64
+# Memory that must be free before a kernel is called that needs some [bytes], where the memory of
+# the process is limited: Fortran's own library ends the program if a small allocation fails.
+RESERVE = 2**24
 
 
 class Progress(NamedTuple):
@@ -51,6 +56,16 @@ def checked(results: Any) -> tuple[Any, ...]:
     return tuple(values)
 
 
+def check_reserve() -> None:
+    """Raise a `RunError` if there is hardly any memory."""
+    if resource.getrlimit(resource.RLIMIT_AS)[0] == resource.RLIM_INFINITY:
+        return
+    try:
+        mmap.mmap(-1, RESERVE).close()
+    except OSError:
+        raise RunError("there is not enough memory for a simulation") from None
+
+
 class Kernel:
     """A simulation in Fortran: its parts are set, then it is started or restored, then it advances.
 
@@ -59,6 +74,7 @@ class Kernel:
     """
 
     def __init__(self) -> None:
+        check_reserve()
         self._handle: Words = np.zeros(2, dtype=np.int64)
         self._lock = threading.Lock()
         _core.open_simulation(self._handle)
@@ -173,6 +189,7 @@ class Kernel:
     def advance(self, max_advances: int, max_work: float) -> None:
         """Advance by a number of advances or an amount of work, until buffers should be drained, or
         to the end; the unit of work is an advance of a rigid slider or the break of a contact."""
+        check_reserve()
         self._call(_core.advance_simulation, max_advances, max_work)
 
     def ask(self) -> Progress:

@@ -30,6 +30,8 @@ module mesoslip_drive
       type(accumulator_type) :: impulse
       !> Other work [J]; other impulse in the current stage [N s]
       type(accumulator_type) :: earlier_work, earlier_impulse
+      !> Sum of the sizes of its parts [J], which do not cancel where the drive returns
+      real(wp), private :: earlier_gross_work = 0.0_wp
       !> Maximum and minimum of the force on the slider in the current stage
       type(extremes_type) :: extremes
 
@@ -53,6 +55,8 @@ module mesoslip_drive
       procedure, non_overridable :: stage, begin_stage, stage_impulse
       !> Set rate and acceleration; value and rate at a time; work done so far
       procedure, non_overridable :: change, at, rate_at, work
+      !> Add to the work, and the sum of the sizes of its parts
+      procedure, non_overridable :: add_work, gross_work
       !> Move the time and the origin of the value
       procedure, non_overridable :: rebase
       !> Write the state to an archive, or read it
@@ -235,7 +239,7 @@ contains
       !> Time now [s], rate now, and acceleration from now on
       real(wp), intent(in) :: time, rate, acceleration
 
-      call self%earlier_work%add(self%rate * self%impulse%total())
+      call self%add_work(self%rate * self%impulse%total())
       call self%earlier_impulse%add(self%impulse%total())
       self%impulse = accumulator_type()
       self%value = self%at(time)
@@ -284,6 +288,25 @@ contains
       work = self%earlier_work%total() + self%rate * self%impulse%total()
    end function work
 
+   !> Add work that the impulse at constant velocity does not have.
+   pure subroutine add_work(self, work)
+      class(drive_type), intent(inout) :: self
+      !> The work [J]
+      real(wp), intent(in) :: work
+
+      call self%earlier_work%add(work)
+      self%earlier_gross_work = self%earlier_gross_work + abs(work)
+   end subroutine add_work
+
+   !> Sum of the sizes of the parts of the work so far [J]: at each constant velocity, and in each
+   !> advance of a drive that accelerates or is a force.
+   pure function gross_work(self) result(work)
+      class(drive_type), intent(in) :: self
+      real(wp) :: work
+
+      work = self%earlier_gross_work + abs(self%rate * self%impulse%total())
+   end function gross_work
+
    !> Move the time and the origin of the value, so that both count from now on.
    subroutine rebase(self, time, shift)
       class(drive_type), intent(inout) :: self
@@ -309,6 +332,7 @@ contains
       call archive%exchange("drive direction", self%direction)
       call archive%exchange("impulse", self%impulse)
       call archive%exchange("earlier_work", self%earlier_work)
+      call archive%exchange("earlier_gross_work", self%earlier_gross_work)
       call archive%exchange("earlier_impulse", self%earlier_impulse)
       call self%extremes%exchange(archive)
    end subroutine exchange

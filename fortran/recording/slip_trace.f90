@@ -34,6 +34,8 @@ module mesoslip_recording_slip_trace
       !> Time of the first sample of the present fall [s], and its samples so far
       real(wp), private :: start_time = 0.0_wp
       integer(i8), private :: samples = 0
+      !> Time of the last sample, and of the last one that will not be dropped [s]
+      real(wp), private :: last_time = -huge(1.0_wp), kept_time = -huge(1.0_wp)
       !> Number of the slip whose trace is taken
       integer(i8), private :: slip = 0
       !> Whether the present trace has been of a slip
@@ -99,8 +101,11 @@ contains
       do while (self%next_time <= end_time)
          sample(:slip_trace_length - 1) = sample_of(slider%observe(self%next_time), detached)
          call self%rows%add(sample)
+         self%last_time = self%next_time
          self%samples = self%samples + 1
-         self%next_time = self%start_time + real(self%samples, wp) * self%interval
+         ! Late in a run the interval may be below the rounding error of the time.
+         self%next_time = max(self%start_time + real(self%samples, wp) * self%interval, &
+            & nearest(self%last_time, 1.0_wp))
       end do
    end subroutine take_samples
 
@@ -118,9 +123,13 @@ contains
       end if
       self%start_time = time
       self%samples = 0
+      ! A fall may begin where the one before did, after one within rounding.
+      if (.not. self%last_time < time) self%samples = 1
       self%next_time = huge(1.0_wp)
-      if (self%interval > 0.0_wp) self%next_time = time
-      self%kept_count = self%rows%count
+      if (self%interval > 0.0_wp) then
+         self%next_time = time + real(self%samples, wp) * self%interval
+      end if
+      call self%keep()
    end subroutine begin
 
    !> The fall is a slip, to which its samples belong.
@@ -138,7 +147,9 @@ contains
    subroutine drop(self)
       class(slip_trace_type), intent(inout) :: self
 
-      if (.not. self%has_slip) self%rows%count = min(self%rows%count, self%kept_count)
+      if (self%has_slip) return
+      self%rows%count = min(self%rows%count, self%kept_count)
+      self%last_time = self%kept_time
    end subroutine drop
 
    !> The fall is not a slip: the trace continues only after a slip.
@@ -154,6 +165,7 @@ contains
       class(slip_trace_type), intent(inout) :: self
 
       self%kept_count = self%rows%count
+      self%kept_time = self%last_time
    end subroutine keep
 
    !> End the trace: no samples until the next fall.
@@ -176,6 +188,8 @@ contains
       call archive%exchange("kept_count", self%kept_count)
       call archive%exchange("start_time", self%start_time)
       call archive%exchange("samples", self%samples)
+      call archive%exchange("last_time", self%last_time)
+      call archive%exchange("kept_time", self%kept_time)
       call archive%exchange("slip", self%slip)
       call archive%exchange("has_slip", self%has_slip)
       call self%rows%exchange("rows", archive)

@@ -284,7 +284,7 @@ contains
             & * horner(self%series, terms, self%point(node) * step)**2
       end do
       squares = squares * step
-      call self%drive%earlier_work%add(force * distance &
+      call self%drive%add_work(force * distance &
          & + self%drive%rate * (step * distance - swept))
       call self%drive%earlier_impulse%add(step * (force + 0.5_wp * self%drive%rate * step))
       call self%drag_loss%add(self%law%drag * squares)

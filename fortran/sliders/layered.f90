@@ -352,7 +352,7 @@ contains
          lever = step**2 * (0.5_wp * drive + step * (drive_velocity / 3.0_wp &
             & + 0.125_wp * drive_acceleration * step) - lever)
          call self%drive%earlier_impulse%add(self%system%spring * extension)
-         call self%drive%earlier_work%add(self%system%spring &
+         call self%drive%add_work(self%system%spring &
             & * (drive_velocity * extension + drive_acceleration * lever))
       else
          call self%drive%impulse%add(self%system%spring * extension)

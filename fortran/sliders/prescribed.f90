@@ -185,7 +185,7 @@ contains
 
       distance = self%displacement - start
       step = self%time - self%step_time
-      call self%drive%earlier_work%add(distance * (law%stiffness * (start + 0.5_wp * distance) &
+      call self%drive%add_work(distance * (law%stiffness * (start + 0.5_wp * distance) &
          & - law%offset) + law%drag * square() &
          & + law%rate * step**2 * (0.5_wp * early + self%drive%acceleration * step / 3.0_wp))
       call self%drag_loss%add(law%drag * square())

@@ -187,7 +187,7 @@ contains
          ! In equilibrium the contact force is that of the spring, with more digits if it is stiff.
          middle = law%stiffness * (start + 0.5_wp * distance) - law%offset
          if (abs(drive%acceleration) > 0.0_wp) then
-            call drive%earlier_work%add(step * (drive%rate_at(self%step_time) &
+            call drive%add_work(step * (drive%rate_at(self%step_time) &
                & + 0.5_wp * drive%acceleration * step) * middle)
             call drive%earlier_impulse%add(step * (law%stiffness * (start + step * (0.5_wp &
                & * self%velocity + self%acceleration * step / 6.0_wp)) - law%offset))

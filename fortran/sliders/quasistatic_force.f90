@@ -44,7 +44,7 @@ contains
       class(slider_quasistatic_force_type), intent(inout) :: self
       real(wp), intent(in) :: distance, pull
 
-      call self%drive%earlier_work%add(distance * pull)
+      call self%drive%add_work(distance * pull)
    end subroutine add_jump
 
    subroutine add_motion(self, step, distance)
@@ -57,7 +57,7 @@ contains
       rate = self%drive%rate_at(self%step_time)
       acceleration = self%drive%acceleration
       ! The displacement grows with the force, so the work is that of their mean.
-      call self%drive%earlier_work%add(distance &
+      call self%drive%add_work(distance &
          & * (pull + step * (0.5_wp * rate + 0.25_wp * acceleration * step)))
       call self%drive%earlier_impulse%add(step &
          & * (pull + step * (0.5_wp * rate + acceleration * step / 6.0_wp)))

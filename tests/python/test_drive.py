@@ -68,6 +68,27 @@ def test_a_ramp_is_the_limit_of_a_staircase(kind, floor):
     assert errors[1] < 1e-6 + floor
 
 
+@pytest.mark.parametrize("engine", ["eq", "me"])
+def test_energy_of_closed_cycles_is_balanced(engine):
+    """Without breaks and damping they return the work of the drive: its sum is of rounding errors,
+    and the residual is one of what has flowed."""
+    time = 0.5
+    stages = [{"duration": time, "velocity": one} for one in (1e-8, -1e-8)]
+    slider = {"mass": 1.47e-3, "stiffness": 1e5, "damping_ratio": 0.0}
+    tables = {"run": {"duration": 2 * time, "engine": engine}, "slider": slider}
+    tree = mesoslip.run(
+        klein_tables(
+            **tables, drive={"stage": stages}, output={"interval": 0.1}, contacts__count=99
+        )
+    )
+    assert tree.attrs["break_count"] == 0
+    # That into the springs of drive and contacts in series, and back.
+    flow = 2 * 0.5 / (1 / 1e5 + 1 / 2000) * (1e-8 * time) ** 2
+    assert abs(float(tree["energy/drive_work"].values[0])) < 1e-6 * flow
+    assert abs(float(tree["energy_residual"].values[0])) < 1e-12
+    assert tree.attrs["audit"] == "passed"
+
+
 def energy_bound(kind):
     """Maximum residual of the energy balance of a short run, relative to the work of the drive."""
     words = set(kind.split(", "))

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from conftest import ROOT
 from mesoslip.measured.headers import read_header
-from mesoslip.measured.sampling import in_order, sampling_report
+from mesoslip.measured.sampling import in_order, sampling_report, sampling_summary
 from mesoslip.measured.trace import understand
 from mesoslip.measured.units import size_of
 from scipy.io import savemat
@@ -181,6 +181,13 @@ def test_damaged_files_give_no_wrong_numbers(tmp_path, number):
         ("F_N", None, None),
         ("F_N [mN]", "normal_force", "mN"),
         ("load [N]", None, "N"),
+        # The unit decides, and names of groups stand before names.
+        ("Friction [uN]", "force", "uN"),
+        ("Normal [uN]", "normal_force", "uN"),
+        ("Normal stress (kN)", "normal_force", "kN"),
+        ("COF [%]", "friction", "%"),
+        ("DAQ.Fx (N)", "force", "N"),
+        ("DAQ.COF", "friction", None),
     ],
 )
 def test_headers_of_the_field(header, quantity, unit):
@@ -349,6 +356,47 @@ def test_rounded_times_are_spread():
     found, _, notes = ordered(np.floor(np.arange(400) / 4) * 1e-3)
     np.testing.assert_allclose(found, np.arange(400) * 0.25e-3, atol=1e-12)
     assert "guess: times are rounded to 1 ms" in notes
+
+
+def test_named_columns_need_no_unit_beside_their_name(tmp_path):
+    """As those that are found: seconds are a guess. A factor may be a number, and a column that
+    never changes is no load point."""
+    rows = "".join(f"{0.1 * n:.1f},{0.5 + 0.01 * (n % 7):.2f},3\n" for n in range(40))
+    (tmp_path / "a.csv").write_text("Time / s,DAQ.COF,x [mm]\n" + rows)
+    (tmp_path / "b.csv").write_text("t,DAQ.COF,x [mm]\n" + rows)
+    column = '{ column = "DAQ.COF", factor = 1 }'
+    for name, time in (("a", "Time"), ("b", "t")):
+        text = f'file = "{name}.csv"\ncolumns = {{ time = "{time}", friction = {column} }}\n'
+        (tmp_path / "run.toml").write_text("[trace]\n" + text)
+        record = understand(tmp_path / "run.toml").record
+        np.testing.assert_allclose(record.time, 0.1 * np.arange(40))
+        assert record.force.max() == pytest.approx(0.56)
+        assert record.load_point is None
+        report = "\n".join(record.report)
+        assert ("guess: 't' has no unit: taken as seconds" in report) == (name == "b")
+        assert "'x [mm]' (constant" in report
+
+
+def test_many_rates_are_one_line(tmp_path, command):
+    """Of rates, and of noise; each rate only when asked for, and in the file."""
+    steps = np.repeat([0.01, *np.tile([0.1, 0.01], 4)], 50)
+    time = np.concatenate([[0], np.cumsum(steps)])
+    rng = np.random.default_rng(5)
+    force = 1 + 0.01 * rng.standard_normal(time.size)
+    (tmp_path / "a.csv").write_text(
+        "time_s,force_N\n" + "".join(f"{t:.2f},{f:.5f}\n" for t, f in zip(time, force, strict=True))
+    )
+    (line,) = sampling_summary(time)
+    assert line == (
+        "samples: 451 from 0 s to 22.5 s, unevenly, at 10 to 100 Hz (median 100), 0 gaps; "
+        "nothing is filled in"
+    )
+    assert len(sampling_report(time)) == 9
+    short, long = (
+        command("trace", tmp_path / "a.csv", "--dry-run", *options)[1]
+        for options in ((), ("--verbose",))
+    )
+    assert (short.count("samples: "), long.count("samples: ")) == (1, 9)
 
 
 def test_rates_and_gaps_are_reported():

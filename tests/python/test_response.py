@@ -444,6 +444,13 @@ def test_an_output_with_one_velocity_has_a_steady_force_and_no_more():
     assert "no data for a, b and D_c" in rows_of(found, "rate_and_state")[0]["note"]
 
 
+def test_forces_beyond_all_bounds_are_refused():
+    tree = mesoslip.open_output(ROOT / "tests" / "reference" / "old.nc")
+    tree["spring_force"].values[0, 3] = -1e308
+    with pytest.raises(FileError, match=r"a damaged output: its force reaches 1e\+308"):
+        mesoslip.response(tree)
+
+
 def test_pictures(sliding):
     whole = mesoslip.plot(sliding, view="response")
     assert isinstance(whole, Figure)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import mesoslip
 import numpy as np
 import pytest
@@ -185,7 +187,7 @@ def test_what_is_wrong_with_a_file_is_reported_once(tmp_path, text, words):
     ("threshold", "key", "words"),
     [
         ({"law": "table"}, "file", 'needed for law = "table"'),
-        ({"law": "table", "file": "none.csv"}, "file", "no such file"),
+        ({"law": "table", "file": "none.csv"}, "file", f"no such file in {Path.cwd()}"),
         ({"law": "table", "file": "a.csv", "samples": [1, 2]}, "file", "give either"),
         ({"law": "table", "samples": [1, 2], "weights": [1]}, "weights", "as many values"),
         ({"law": "table", "samples": [1, -2]}, "samples", "must be positive: a threshold is -2"),

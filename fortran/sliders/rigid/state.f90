@@ -186,7 +186,7 @@ contains
          extension = step * (system%drive_gap + step * (0.5_wp * velocity &
             & + inverse(6) * acceleration * step)) - swept
          call self%drive%earlier_impulse%add(self%stiffness * extension)
-         call self%drive%earlier_work%add(self%stiffness * (velocity * extension + acceleration &
+         call self%drive%add_work(self%stiffness * (velocity * extension + acceleration &
             & * (step**2 * (0.5_wp * system%drive_gap + step &
             & * (inverse(3) * velocity + 0.125_wp * acceleration * step)) - moment)))
       end associate

@@ -31,6 +31,8 @@ Array = NDArray[np.float64]
 PEAK_STRETCHES = 3.0
 # Minimum share of the slider's displacement in slips for a stage of stick-slip.
 STICK_SLIP_SHARE = 0.1
+# Maximum force in any unit: squares of larger ones overflow.
+MAX_FORCE = 1e100
 # Relative tolerance of times: sums of intervals have rounding errors.
 TIME_TOLERANCE = 1e-9
 # Recorded variables of an extreme: its force, time and displacement.
@@ -136,6 +138,9 @@ class Experiment:
         count = int(np.argmin(whole)) if not whole.all() else whole.size
         if count == 0:
             raise FileError(f"{name}: has no sample common to all realizations")
+        largest = float(np.max(np.abs(force[:, :count])))
+        if largest > MAX_FORCE:
+            raise FileError(f"{name}: a damaged output: its force reaches {largest:.3g}")
         self.time: Array = root["time"].values[:count]
         self.force: Array = force[:, :count]
         self.drive: Array = self._drive(root)[:count]

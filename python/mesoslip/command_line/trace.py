@@ -87,6 +87,9 @@ def trace(
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Print what is understood, and write nothing")
     ] = False,
+    verbose: Annotated[
+        bool, typer.Option("--verbose", help="Print each sampling rate, with its noise")
+    ] = False,
 ) -> None:
     """Read a measured trace as the laboratory wrote it, and write an output like that of a run."""
     from mesoslip.measured.trace import trace_of, understand
@@ -116,7 +119,7 @@ def trace(
         part=part,
         min_fall=min_fall,
     )
-    for line in understood.report:
+    for line in understood.report if verbose else understood.summary:
         typer.echo(line)
     if dry_run:
         return

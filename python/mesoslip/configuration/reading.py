@@ -55,7 +55,9 @@ def text_of(path: Path, kind: str, max_bytes: int = MAX_BYTES) -> str:
             )
         return path.read_text(encoding="utf-8")
     except FileNotFoundError:
-        raise FileError(f"{path}: no such file") from None
+        # The folder is that of the configuration, or the present one for a name in --set.
+        beside = "" if path.is_absolute() else f" in {Path.cwd()}"
+        raise FileError(f"{path}: no such file{beside}") from None
     except OSError as error:
         raise FileError(f"{path}: cannot be read: {error.strerror}") from None
     except UnicodeDecodeError as error:

@@ -169,7 +169,14 @@ def _cycle_of(
         period = math.fsum(durations) if periodic else float(np.mean(durations))
         peak = float(np.max(peaks) if periodic else np.mean(peaks))
         low = float(np.min(lows) if periodic else np.mean(lows))
-        spread = float(np.std(peaks - lows) / np.mean(peaks - lows))
+        mean = float(np.mean(peaks - lows))
+        spread = max(
+            float(np.std(values)) / scale
+            for values, scale in (
+                (durations, float(np.mean(durations))),
+                *((one, mean) for one in (peaks, lows, peaks - lows)),
+            )
+        )
     slips = sum(len(one.slips) for one in passages)
     slip_time = math.fsum(one.slip_duration for one in passages)
     traces = [structured(np.empty((0, len(TRACE_COLUMNS))), TRACE_COLUMNS)]

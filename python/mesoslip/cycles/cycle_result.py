@@ -30,7 +30,7 @@ SUMMARY = {
     "low_force": ("N", "minimum of the spring force"),
     "amplitude": ("N", "maximum less minimum"),
     "amplitude_ratio": ("", "amplitude over the static force"),
-    "spread": ("", "variation of the amplitude between passages"),
+    "spread": ("", "variation of periods, maxima and minima between passages, the largest one"),
     "slip_share": ("", "part of the time in slips"),
     "peak_velocity": ("m/s", "maximum of the velocity"),
     "multiplier": ("", "factor of small changes from cycle to cycle, the leading modulus"),
@@ -62,7 +62,8 @@ class Cycle:
     amplitude
         Maximum minus minimum of the spring force [N]; 0 for smooth sliding.
     spread
-        Standard deviation of the amplitudes of the passages over their mean.
+        Variation between passages: the largest standard deviation of their periods, over the mean,
+        and of their maxima, minima and amplitudes, over the mean amplitude.
     peak_velocity
         Maximum velocity of the slider [m/s].
     slips

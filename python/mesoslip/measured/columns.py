@@ -13,7 +13,14 @@ from mesoslip.configuration.columns import IGNORED
 from mesoslip.configuration.units import NUMBER, number_of, to_si
 from mesoslip.errors import ConfigError, FileError, Problem, shown
 from mesoslip.measured.description import Column, Columns
-from mesoslip.measured.headers import EITHER, QUANTITIES, Heading, name_of, read_header
+from mesoslip.measured.headers import (
+    EITHER,
+    QUANTITIES,
+    Heading,
+    bare_name,
+    name_of,
+    read_header,
+)
 from mesoslip.measured.reading.table import Array, Table, listed
 from mesoslip.measured.units import plain, size_of, unit_named
 
@@ -59,8 +66,6 @@ class Used:
     """Its unit as written; may be empty."""
     size: float
     offset: float = 0.0
-    guess: str = ""
-    """Doubts about it."""
 
 
 @dataclass
@@ -85,7 +90,7 @@ def assign(table: Table, columns: Columns, headers: str | None) -> Assignment:
         if column is None:
             continue
         try:
-            found.used[name] = _described(table, name, column)
+            found.used[name] = _described(table, name, column, found.guesses)
         except ValueError as error:
             problems.append(Problem(str(table.path), f"trace.columns.{name}", str(error)))
     if problems:
@@ -130,15 +135,17 @@ def _explicit(table: Table, header: str) -> Heading:
     return heading._replace(quantity=quantity)
 
 
-def _described(table: Table, name: str, column: Column) -> Used:
-    """A column as a table describes it; a ValueError if it is missing or its units disagree."""
+def _described(table: Table, name: str, column: Column, guesses: list[str]) -> Used:
+    """A column as a table describes it, with guesses about its unit; a ValueError if it is missing
+    or its units disagree."""
     index = _index_of(table, column.column)
     heading = read_header(table.headers[index], table.units[index])
     unit = plain(column.unit if column.unit is not None else heading.unit or "")
     si = QUANTITIES[name]
     if column.factor is None:
         size, guess = _size(unit, name, table.headers[index])
-        return Used(index, unit, size, _offset(column.offset, unit), guess)
+        guesses += [guess] if guess else []
+        return Used(index, unit or _assumed(name), size, _offset(column.offset, unit))
     factor, unit = _factor(column.factor, unit, si)
     return Used(index, unit, factor, _offset(column.offset, unit))
 
@@ -149,6 +156,7 @@ def _index_of(table: Table, column: str) -> int:
         lambda text: text.strip().casefold(),
         lambda text: re.sub(r"\s*[\[({<].*", "", text).strip().casefold(),
         name_of,
+        bare_name,
     ):
         target = named(column)
         matches = [n for n, one in enumerate(table.headers) if target and named(one) == target]
@@ -175,6 +183,8 @@ def _size(unit: str, quantity: str, header: str) -> tuple[float, str]:
     si, right = QUANTITIES[quantity], f"write it as {EXAMPLES[quantity]!r}"
     if not unit and si == "1":
         return 1.0, ""
+    if not unit and quantity == "time":
+        return 1.0, f"{shown(header)} has no unit: taken as seconds"
     if not unit:
         raise ValueError(f"column {shown(header)} has no unit; {right}")
     try:
@@ -190,6 +200,11 @@ def _size(unit: str, quantity: str, header: str) -> tuple[float, str]:
             f"{quantity.replace('_', ' ')}; {right}{hint}"
         )
     return found.size, f"{shown(header)}: {found.note}" if found.note else ""
+
+
+def _assumed(quantity: str) -> str:
+    """The unit of a column without one."""
+    return "s" if quantity == "time" else ""
 
 
 def size_of_voltage(unit: str) -> float | None:
@@ -304,21 +319,23 @@ def _two(table: Table, quantity: str, indices: Sequence[int], found: Assignment)
 def _use(table: Table, quantity: str, index: int, heading: Heading, found: Assignment) -> None:
     """Use a column for a quantity, if its unit is known."""
     header, unit = table.headers[index], heading.unit or ""
-    if quantity == "time" and not unit:
-        found.used[quantity] = Used(index, "s", 1.0)
-        found.guesses.append(f"{shown(header)} has no unit: taken as seconds")
+    if quantity == "load_point" and _is_constant(table.values[index]):
+        found.unused[index] = "constant: a load point moves"
         return
     try:
         size, guess = _size(unit, quantity, header)
     except ValueError as error:
         found.unused[index] = str(error)
         return
-    found.used[quantity] = Used(index, unit, size)
+    found.used[quantity] = Used(index, unit or _assumed(quantity), size)
     found.guesses += [one for one in (guess, heading.guess) if one]
 
 
 def _use_either(table: Table, index: int, heading: Heading, found: Assignment) -> None:
     """Use a displacement as that of the load point or of the slider, depending on its motion."""
+    if _is_constant(table.values[index]):
+        found.unused[index] = "constant: neither a load point nor a slider moves so"
+        return
     if "load_point" in found.used:
         quantity, why = "displacement", "as the load point has a column of its own"
     elif "displacement" in found.used:
@@ -334,6 +351,12 @@ def _use_either(table: Table, index: int, heading: Heading, found: Assignment) -
         found.guesses.append(
             f"{shown(table.headers[index])} taken as the displacement of {what}, {why}"
         )
+
+
+def _is_constant(values: Array) -> bool:
+    """Whether a column has a single number."""
+    known = values[np.isfinite(values)]
+    return not known.size or float(np.ptp(known)) == 0.0
 
 
 def _moves_in_slips(table: Table, index: int, found: Assignment) -> bool:

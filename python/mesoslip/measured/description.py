@@ -93,6 +93,11 @@ def _name_or_number(value: object) -> object:
     return str(value) if isinstance(value, int) else value
 
 
+def _number_as_text(value: object) -> object:
+    """A number as it would be written, such as "1"."""
+    return value if isinstance(value, bool) or not isinstance(value, int | float) else repr(value)
+
+
 class Column(Table):
     """A column of the file, and how its numbers become a quantity: (number - offset) x factor."""
 
@@ -100,9 +105,9 @@ class Column(Table):
     """Name of the column in the file's header, with or without its unit; or its number from 1."""
     unit: Text | None = None
     """Unit of the column, if its header has none or a wrong one."""
-    factor: Text | None = None
+    factor: Annotated[Text, BeforeValidator(_number_as_text)] | None = None
     """Quantity for one unit of the column, such as "12.4 mN/V", "9.80665e-3 N" or "1"."""
-    offset: Text | None = None
+    offset: Annotated[Text, BeforeValidator(_number_as_text)] | None = None
     """Number to subtract, in the unit of the column, such as "0.3 V"."""
 
 

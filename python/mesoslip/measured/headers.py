@@ -35,7 +35,7 @@ NAMES = {
     "|friction coef|coef of friction|coeff of friction|cof|mu|f mg|f over mg|f over n|f fn"
     "|f over fn|f w|ft fn|f t f n|apparent friction|tau sigma|tau over sigma|tau sigma n|tau sn"
     "|friction factor|reibwert|reibungskoeffizient|mu app|shear stress normal stress|ff fn",
-    "normal_force": "normal force|normal load|normalforce|normalload|fn|f n|vertical force"
+    "normal_force": "normal|normal force|normal load|normalforce|normalload|fn|f n|vertical force"
     "|vertical load|normalkraft|force normal|force n|fz|f z|nload",
     "normal_stress": "normal stress|normalstress|sigma n|sigman|sigma|σ|σn|sn"
     "|effective normal stress|eff normal stress|norm stress|stress normal|sigma eff",
@@ -50,6 +50,18 @@ NAMES = {
     EITHER: "displacement|displ|disp|position|pos|x|distance|travel|horizontal displacement"
     "|shear displacement|weg|deplacement|horizontal disp|shear disp|x position",
 }  # fmt: skip
+# Quantities of names by the dimension of their unit, which tells forces from stresses.
+BY_UNIT = {
+    "shear": {"N": "force", "Pa": "shear_stress"},
+    "normal": {"N": "normal_force", "Pa": "normal_stress"},
+}
+LIKE = {
+    "force": "shear",
+    "shear_stress": "shear",
+    "friction": "shear",
+    "normal_force": "normal",
+    "normal_stress": "normal",
+}
 MEANINGS = {name: quantity for quantity, names in NAMES.items() for name in names.split("|")}
 
 BRACKETS = re.compile(r"\[([^\]]*)\]|\(([^)]*)\)|\{([^}]*)\}|<([^>]*)>")
@@ -82,10 +94,39 @@ def meaning_of(name: str) -> str | None:
 def read_header(header: str, unit: str = "") -> Heading:
     """Meaning of a header; ``unit`` is that of a line of units below it.
 
+    A name may follow that of a group, as in "DAQ.Fx (N)". The unit decides between a force, a
+    stress and a coefficient.
+
     >>> read_header("Normal_stress(MPa)"), read_header("lp_disp_um")
     (Heading(quantity='normal_stress', unit='MPa', guess=''), \
 Heading(quantity='load_point', unit='um', guess=''))
     """
+    found = _by_unit(_read(header, unit))
+    group = re.match(r"\s*[A-Za-z]\w*[.:](?=[A-Za-zµμτσ])", header)
+    if found.quantity is None and group:
+        inner = read_header(header[group.end() :], unit)
+        found = found if inner.quantity is None else inner
+    return found
+
+
+def bare_name(header: str) -> str:
+    """The name in a header without its unit, as `name_of`: "time" for "Time / s"."""
+    divided = (name for name, unit in _divided(header.strip()) if unit and is_unit(unit))
+    return name_of(next(divided, header))
+
+
+def _by_unit(found: Heading) -> Heading:
+    """A meaning that agrees with the unit."""
+    if found.quantity not in LIKE or not found.unit:
+        return found
+    for si, quantity in BY_UNIT[LIKE[found.quantity]].items():
+        if _has_dimension(found.unit, si):
+            return found._replace(quantity=quantity)
+    return found
+
+
+def _read(header: str, unit: str) -> Heading:
+    """Meaning of the name in a header, and the unit."""
     text = header.strip(" \"'")
     unit = unit.strip("[](){}<> ")
     if unit:
@@ -94,7 +135,7 @@ Heading(quantity='load_point', unit='um', guess=''))
     if re.fullmatch(r"(?i)f_?n", text):
         return Heading(None, None)
     whole = meaning_of(text)
-    if whole == "friction":
+    if whole == "friction" and not BRACKETS.search(text):
         guess = ""
         if name_of(text) == "f n" or re.fullmatch(r"(?i)f\s*/\s*n", text):
             guess = f"{text!r} taken as a coefficient, force over normal force, not as newton"
@@ -119,7 +160,11 @@ def _without_brackets(text: str) -> str:
 
 def _fits(unit: str, quantity: str) -> bool:
     """Whether a unit is one of a quantity."""
-    si = QUANTITIES.get(quantity, "m")
+    return _has_dimension(unit, QUANTITIES.get(quantity, "m"))
+
+
+def _has_dimension(unit: str, si: str) -> bool:
+    """Whether a unit is one of the dimension of an SI unit."""
     try:
         return size_of(unit, si) is not None
     except ValueError:

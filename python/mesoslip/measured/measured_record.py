@@ -15,7 +15,7 @@ from mesoslip.measured.description import Column, TraceDescription
 from mesoslip.measured.headers import QUANTITIES, name_of
 from mesoslip.measured.reading.file import read_file
 from mesoslip.measured.reading.table import Array, Table, listed
-from mesoslip.measured.sampling import in_order, sampling_report
+from mesoslip.measured.sampling import in_order, sampling_report, sampling_summary
 from mesoslip.quantities import number, with_unit
 
 MIN_SAMPLES = 4
@@ -63,6 +63,8 @@ class Record:
     """All columns of numbers of the file, with the rows that are not used."""
     report: Sequence[str]
     """Lines about the interpretation of the file."""
+    summary: Sequence[str]
+    """The same, short where samples are uneven."""
 
     @property
     def force_name(self) -> str:
@@ -123,6 +125,8 @@ def read_record(path: Path, trace: TraceDescription) -> Record:
     if inside.sum() < len(inside):
         outside = int((~inside).sum())
         notes.append(f"left out, before start or after end: {outside} of {inside.size}")
+    before = [*_column_report(table, columns, values), made.line]
+    after = [*notes, *(f"guess: {one}" for one in columns.guesses)]
     return Record(
         order.time,
         force[picked],
@@ -134,13 +138,8 @@ def read_record(path: Path, trace: TraceDescription) -> Record:
             for index in range(len(table.headers))
             if np.isfinite(table.values[index]).any()
         ],
-        report=[
-            *_column_report(table, columns, values),
-            made.line,
-            *sampling_report(order.time),
-            *notes,
-            *(f"guess: {one}" for one in columns.guesses),
-        ],
+        report=[*before, *sampling_report(order.time), *after],
+        summary=[*before, *sampling_summary(order.time), *after],
     )
 
 

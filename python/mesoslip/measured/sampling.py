@@ -34,6 +34,8 @@ MAX_CROSSED = 2
 MIN_ROUNDED = 0.1
 MIN_ROUNDED_COUNT = 10
 SIDES: tuple[Literal["left"], Literal["right"]] = ("left", "right")
+# Maximum number of rates that a summary names one by one.
+MAX_RATES = 3
 # Maximum number of rows and gaps in a note.
 NAMED = 5
 
@@ -202,6 +204,22 @@ def _without_equal(time: Array, rows: Numbers, lines: Numbers, notes: list[str],
         "samples to each; they are spread evenly"
     )
     return Order(rows, spread, notes)
+
+
+def sampling_summary(time: Array) -> list[str]:
+    """The report, or one line with the range of the rates, their median and the number of gaps if
+    there are many."""
+    steps = np.diff(time)
+    usual = _usual(steps)
+    stretches = _stretches(usual)
+    if len(stretches) <= MAX_RATES:
+        return sampling_report(time)
+    gaps = np.count_nonzero(steps > MIN_GAP * usual)
+    low, middle, high = (number(1 / one, 3) for one in np.quantile(usual, [1, 0.5, 0]))
+    return [
+        f"samples: {len(time)} from {time[0]:.10g} s to {time[-1]:.10g} s, unevenly, at {low} to "
+        f"{high} Hz (median {middle}), {gaps} gaps; nothing is filled in"
+    ]
 
 
 def sampling_report(time: Array) -> list[str]:

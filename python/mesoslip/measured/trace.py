@@ -35,6 +35,7 @@ from mesoslip.measured.description import (
 from mesoslip.measured.load_point import drive_stages
 from mesoslip.measured.measured_record import Record, RecordedColumn, read_record, resolve
 from mesoslip.measured.output_groups import count_group, noise_group, slip_group, stage_group
+from mesoslip.measured.sampling import MAX_RATES
 from mesoslip.output import variables
 from mesoslip.output.inputs import ConfigLike
 from mesoslip.output.provenance import program_attributes
@@ -92,11 +93,19 @@ class Understood:
     @property
     def report(self) -> list[str]:
         """Lines about the interpretation and the noise."""
-        lines = list(self.record.report)
-        if isinstance(self.noise, TraceNoise):
-            unit = "1" if self.record.is_friction else "N"
-            lines += [f"noise: {one}" for one in self.noise.sentences(unit)]
-        return lines
+        return [*self.record.report, *self._noise_lines(math.inf)]
+
+    @property
+    def summary(self) -> list[str]:
+        """The same, short where samples are uneven."""
+        return [*self.record.summary, *self._noise_lines(MAX_RATES)]
+
+    def _noise_lines(self, max_rates: float) -> list[str]:
+        """Lines about the noise, with that at each rate if there are at most so many."""
+        if not isinstance(self.noise, TraceNoise):
+            return []
+        unit = "1" if self.record.is_friction else "N"
+        return [f"noise: {one}" for one in self.noise.sentences(unit, max_rates)]
 
 
 def understand(

@@ -25,7 +25,7 @@ WORDS = {
     "lbf": "lbf", "lbs": "lbf", "lb": "lbf", "mg": "mg", "t": "t",
     "pascal": "Pa", "pascals": "Pa", "bar": "bar", "bars": "bar", "psi": "psi", "atm": "atm",
     "volt": "V", "volts": "V", "millivolt": "mV", "millivolts": "mV",
-    "hertz": "Hz", "percent": "%",
+    "hertz": "Hz", "percent": "%", "%": "%",
 }  # fmt: skip
 # Symbols, whose case matters, except those without another meaning.
 SYMBOL = re.compile(r"(?P<prefix>[fpnumckMG]?)(?P<unit>m|s|N|Pa|V|Hz)")

@@ -114,7 +114,7 @@ ROOT = Group(
     slip_time_error=Meaning(
         "s", "estimated error of the time at which a slip starts, maximum over all slips"
     ),
-    energy_residual=Meaning("1", "residual of the energy balance over the work of the drive"),
+    energy_residual=Meaning("1", "residual of the energy balance over the work of the drive, to and fro"),
     kernel_seconds=Meaning("s", "computing time of the kernel"),
     avalanche_count=Meaning("1", "number of avalanches in the run", np.int64),
     avalanche_slip=Meaning(
@@ -318,7 +318,9 @@ MOTIONS = "smooth periodic irregular"
 BRANCHES = Group(
     amplitude=Meaning("N", "maximum less minimum of the spring force in the settled motion"),
     amplitude_ratio=Meaning("1", "amplitude over the static force"),
-    spread=Meaning("1", "variation of the amplitude between passages"),
+    spread=Meaning(
+        "1", "variation of periods, maxima and minima between passages, the largest one"
+    ),
     period=Meaning("s", "period, or mean time between passages of an irregular motion"),
     peak_force=Meaning("N", "maximum of the spring force"),
     low_force=Meaning("N", "minimum of the spring force"),

@@ -384,7 +384,8 @@ class Realization(Recorded):
 
     @property
     def energy_residual(self) -> float:
-        """Residual of the energy balance, relative to the work of the drive or its largest term."""
+        """Residual of the energy balance, relative to the work of the drive, to and fro, or the
+        largest term."""
         return self._part_of_work(self.energy[-1])
 
     @property
@@ -397,7 +398,8 @@ class Realization(Recorded):
         contacts, energy = self.config.contacts, self.energy
         # The minimum scale is for runs in which hardly any work is done.
         unit = contacts.static_force**2 / contacts.stiffness
-        scale = abs(energy[0]) or float(np.max(np.abs(energy)))
+        # Cycles may return all of the work.
+        scale = energy[ENERGY_COLUMNS.index("gross_work")] or float(np.max(np.abs(energy)))
         return float(term / max(scale, MIN_ENERGY_RATIO * unit))
 
     @property

@@ -113,14 +113,18 @@ class TraceNoise:
             "drift": self.drift,
         }
 
-    def sentences(self, unit: str = "N") -> list[str]:
-        """Description of the noise; the unit of the force is "N" or "1"."""
+    def sentences(self, unit: str = "N", max_rates: float = math.inf) -> list[str]:
+        """Description of the noise; the unit of the force is "N" or "1". White noise at more rates
+        than the maximum is described by its range."""
 
         def size(value: float) -> str:
             return with_unit(value, unit)
 
         found = [f"white noise of {size(self.deviation)} (standard deviation)"]
-        if len(self.deviations) > 1:
+        if len(self.deviations) > max_rates:
+            low, high = min(self.deviations), max(self.deviations)
+            found[0] += f", {size(low)} to {size(high)} at different rates"
+        elif len(self.deviations) > 1:
             found[0] += ", by part: " + ", ".join(
                 f"{size(one)} at {with_unit(1 / interval, 'Hz')}"
                 for one, interval in zip(self.deviations, self.intervals, strict=True)

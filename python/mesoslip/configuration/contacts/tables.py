@@ -33,7 +33,7 @@ from mesoslip.configuration.table import (
 )
 from mesoslip.configuration.threshold_law import ThresholdLaw
 from mesoslip.configuration.threshold_laws import LAWS
-from mesoslip.configuration.threshold_laws.base import ThresholdLawKind
+from mesoslip.configuration.threshold_laws.base import MIN_WIDTH, ThresholdLawKind
 from mesoslip.configuration.threshold_laws.table import (
     StretchCells,
     law_cells,
@@ -94,7 +94,7 @@ class Threshold(Table):
     law: Annotated[str, choice(LAWS)] = "gaussian"
     """Law of the relative thresholds, whose mean is 1; `table` is that of samples, such as measured
     areas of contacts."""
-    relative_width: Annotated[Number, Field(gt=0)]
+    relative_width: Annotated[Number, Field(ge=MIN_WIDTH)]
     """Standard deviation of the relative thresholds, Δf_s/f_s. That of a table follows from its
     samples; leave it out."""
     file: Text | None = None
@@ -208,7 +208,7 @@ class Ageing(Table):
     """Time scale of ageing, τ_a."""
     young_force_ratio: Annotated[Number, Field(gt=0)] | None = None
     """With `relax`: mean threshold of young contacts, relative to that of old ones."""
-    young_relative_width: Annotated[Number, Field(gt=0)] | None = None
+    young_relative_width: Annotated[Number, Field(ge=MIN_WIDTH)] | None = None
     """With `relax`: relative standard deviation of the thresholds of young contacts."""
     growth: Annotated[Number, Field(ge=0)] | None = None
     """With `log`: growth β per e-fold of age, in f_s [1 + β ln(1 + age/time)]."""
@@ -276,6 +276,21 @@ class Thermal(Table):
     """Temperature T, in place of `force_ratio`; f_T = k_B T/x_a."""
     activation_length: Annotated[Length, Field(gt=0)] | None = None
     """Activation length x_a, with `temperature`."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _all_that_is_missing(cls, values: Any) -> Any:
+        """Report keys that depend on one another together with the rate."""
+        if not isinstance(values, Mapping):
+            return values
+        has = {key for key, value in values.items() if value is not None}
+        if "rate" in has or "force_ratio" in has:
+            return values
+        pair = ("temperature", "activation_length")
+        missing = [key for key in pair if key not in has]
+        if len(missing) == 1:
+            raise problem("rate", f"missing, and so is {missing[0]}: f_T = k_B T/x_a needs both")
+        return values
 
     @model_validator(mode="after")
     def _one_force(self) -> Self:

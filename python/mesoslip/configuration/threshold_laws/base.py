@@ -41,8 +41,6 @@ class ThresholdLawKind:
 
     def width_problem(self, width: float) -> str:
         """The error of a relative width; empty if it is possible."""
-        if width < MIN_WIDTH:
-            return f"must be at least {MIN_WIDTH:g} (is {width:g})"
         # An irrational bound may be given with four digits.
         if width > self.max_width * (1 + 1e-4):
             return f"must be at most {self.max_width:.4g} for the {self.name} law{self.if_wider}"

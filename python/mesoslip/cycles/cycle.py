@@ -210,6 +210,10 @@ def master_equation(config: Config) -> Config:
 
     The drive moves in the positive direction: a motion under the opposite drive is a mirror image.
     """
+    return config.adapted(_master_equation)
+
+
+def _master_equation(config: Config) -> Config:
     problems = []
     if config.slider.oscillator is None:
         message = "must be rigid: other sliders have no cycles here"

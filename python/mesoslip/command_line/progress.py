@@ -57,10 +57,9 @@ def say(text: str) -> None:
 
 
 @contextmanager
-def steps_shown() -> Iterator[Callable[[str], None]]:
+def steps_shown(start: float) -> Iterator[Callable[[str], None]]:
     """Reports the steps of work without known lengths: on a terminal as they begin, elsewhere as
-    lines once the work takes a while."""
-    start = time.monotonic()
+    lines once the work, which started at a time of `time.monotonic`, takes a while."""
     if sys.stderr.isatty():
         from rich.console import Console
 

@@ -503,6 +503,12 @@ def test_metadata_agree():
     assert [one["version"] for one in locked if one["name"] == project["name"]] == [
         project["version"]
     ]
+    systems = [one.rpartition(" :: ")[2] for one in project["classifiers"] if "Operating" in one]
+    assert codemeta["operatingSystem"] == systems
+    # An address is that of the project, or there is none.
+    address = project["urls"].get("Repository")
+    assert codemeta.get("codeRepository") == address
+    assert re.findall(r"^repository-code: (.*)$", citation, re.M) == ([address] if address else [])
     assert codemeta["license"].endswith(project["license"])
     assert codemeta["description"] == project["description"]
     assert codemeta["keywords"] == project["keywords"]

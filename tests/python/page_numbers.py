@@ -10,8 +10,9 @@ A comment below a passage has a line for each number, or row of numbers, as the 
 
 Text that begins with a number is looked for on the page; after the equals sign is its value, in SI
 if the text ends with a unit. It may differ by one in its last digit, or by a share that is given.
-Other lines are executed. `<!-- printed -->` above a block, or `<!-- printed, 2 % -->`, states that
-the commands above have printed its lines, with numbers within that share.
+Other lines are executed, with the text as `page`. `<!-- printed -->` above a block, or
+`<!-- printed, 2 % -->`, states that the commands above have printed its lines, with numbers within
+that share.
 """
 
 from __future__ import annotations
@@ -57,18 +58,21 @@ def size_of(unit: str) -> float:
 
 def wrong_numbers(comment: str, page: str, names: dict[str, Any]) -> list[str]:
     """What is wrong with numbers of a page, by a comment that uses names of the blocks above."""
-    flat, wrong = " ".join(page.split()), []
-    for line in comment.splitlines():
-        match = CHECK.match(line)
+    flat, wrong, statements = " ".join(page.split()), [], []
+    names["page"] = page
+    for match, line in ((CHECK.match(one), one) for one in comment.splitlines()):
         if match is None:
-            exec(line, names)
+            statements.append(line)
             continue
+        exec("\n".join(statements), names)
+        statements.clear()
         text, share = match["text"], match["percent"]
         # Once on the page, and once in the comment itself.
         if flat.count(text) < 2:
             wrong.append(f"{text!r} is not on the page")
         found = np.ravel(np.asarray(eval(match["expression"], names), dtype=float)).tolist()
         wrong += differences(text, found, None if share is None else float(share) / 100)
+    exec("\n".join(statements), names)
     return wrong
 
 
@@ -92,7 +96,9 @@ def not_printed(block: str, printed: str, share: float) -> list[str]:
     for line in printed.splitlines():
         lines.setdefault(_words(line), []).append(NUMBER.findall(line))
     wrong = []
-    for line in filter(None, map(str.strip, block.splitlines())):
+    for line in block.splitlines():
+        if not line.strip() or line.startswith("$ "):
+            continue
         numbers = [number_of(one) for one in NUMBER.findall(line)]
         if not any(
             np.allclose(numbers, [number_of(one) for one in other], rtol=share, atol=0)

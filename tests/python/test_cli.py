@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import json
 import math
@@ -131,6 +132,31 @@ def test_of_many_rows_the_first_and_the_last_are_printed(tmp_path, command, monk
         True,
     ]
     assert "… (2 others, all with --json)" in regimes
+
+
+def test_all_that_takes_a_while_reports_its_progress(tmp_path, command, monkeypatch):
+    """Where there is no terminal too: writing after the run, measured traces, movies; and a large
+    output before the run."""
+    monkeypatch.setattr("mesoslip.command_line.progress.PATIENCE", -1.0)
+    monkeypatch.setattr("mesoslip.command_line.run.LARGE", 1e5)
+    # xarray has seen Dask in other tests.
+    monkeypatch.setattr("mesoslip.command_line.pictures.hidden", contextlib.nullcontext)
+    output, table = tmp_path / "run.nc", tmp_path / "a.csv"
+    small = ("--set", "contacts.count=100", "--set", "run.duration=2 s")
+    quick = (*small, "--set", "output.snapshots=['0 s', '1 s']")
+    _, _, err = command("run", ROOT / "runs" / "klein.toml", "-o", output, *quick)
+    assert "simulating: 100 % after 0 s\n" in err
+    assert "writing: 100 % after 0 s\n" in err
+    size = float(re.search(r"the output will take about (\S+) GB", err)[1])
+    assert output.stat().st_size == pytest.approx(1e9 * size, rel=0.3)
+    err = command("plot", output, "-o", tmp_path / "contacts.gif", "--view", "contacts")[2]
+    assert "drawing: 50 %" in err
+    assert "drawing: 100 %" in err
+    rows = "".join(f"{0.01 * n:.2f},{3 + n % 9 / 9:.4f}\n" for n in range(300))
+    table.write_text(f"time [s],force [N]\n{rows}")
+    err = command("trace", table, "-o", tmp_path / "trace.nc")[2]
+    steps = re.findall(r"after \d+ s: (.*)", err)
+    assert steps == ["reading", "estimating the noise", "looking for slips", "writing"]
 
 
 def test_plot(short, tmp_path, command):

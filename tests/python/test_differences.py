@@ -8,6 +8,7 @@ import tomli_w
 from conftest import ROOT, klein_tables
 from mesoslip.configuration import differences
 from mesoslip.configuration.units import cf_units, from_cf_units
+from mesoslip.cycles.cycle import master_equation
 
 KLEIN = ROOT / "runs" / "klein.toml"
 
@@ -90,3 +91,28 @@ def test_stages_are_reported(klein):
     stages = [{"duration": 4, "velocity": 1e-7}, {"duration": 1, "velocity": 0}]
     turned = klein(drive={"stage": stages})
     assert differences.changes(turned, klein()) == ["drive.stage = [(4 s, 100 nm/s), (1 s, 0 m/s)]"]
+
+
+def test_changes_of_the_program_are_none_of_the_user(tmp_path):
+    """A cycle, which is of the master equation, and a trace with its own duration, differ from
+    their bases in what was set."""
+    (tmp_path / "mine.toml").write_text(f'base = "{KLEIN}"\n[slider]\nstiffness = "300 N/m"\n')
+    changed = mesoslip.Config.load(KLEIN, ["slider.stiffness=300 N/m"])
+    for config in (changed, mesoslip.Config.load(tmp_path / "mine.toml")):
+        cycle = master_equation(config)
+        started = cycle.replace({"contacts.initial": "steady"})
+        measured = config.adapted(lambda one: one.replace({"run.duration": 14.0}))
+        stiffer = "slider.stiffness = 300 N/m (was 97 N/m)"
+        assert differences.changes(cycle, cycle.base) == [stiffer]
+        assert differences.changes(measured, measured.base) == [stiffer]
+        start = "contacts.initial = steady (was relaxed)"
+        assert sorted(differences.changes(started, started.base)) == [start, stiffer]
+    assert master_equation(mesoslip.Config.load(KLEIN)).base is None
+
+
+def test_a_title_of_the_base_is_none_of_ones_own(tmp_path):
+    (tmp_path / "mine.toml").write_text(f'base = "{KLEIN}"\n')
+    mine = mesoslip.Config.load(tmp_path / "mine.toml")
+    assert mine.own_title is None
+    assert mine.title == mesoslip.Config.load(KLEIN).own_title
+    assert mine.replace("title=Mine").own_title == "Mine"

@@ -296,11 +296,7 @@ def type_page(page, workshop, command, *, is_run=True):
                 text = page.read_text(encoding="utf-8")
                 wrong = page_numbers.wrong_numbers(block.text, text, names)
                 assert not wrong, "\n".join(wrong)
-            elif block.printed_share is not None:
-                if is_compared:
-                    wrong = page_numbers.not_printed(block.text, printed, block.printed_share)
-                    assert not wrong, "\n".join(wrong)
-            elif is_shell:
+            elif is_shell and (block.printed_share is None or "$ " in block.text):
                 for words, comment in commands_of(block.text):
                     if words[0] == "mesoslip":
                         parse_command(words)
@@ -308,6 +304,9 @@ def type_page(page, workshop, command, *, is_run=True):
                             printed += run_command(words, comment, command)
                     elif words[0] == "make":
                         check_targets(words[1:])
+            if block.printed_share is not None and is_compared:
+                wrong = page_numbers.not_printed(block.text, printed, block.printed_share)
+                assert not wrong, "\n".join(wrong)
         except Exception as error:
             error.add_note(f"in {place}")
             raise
@@ -504,6 +503,12 @@ def test_metadata_agree():
     assert [one["version"] for one in locked if one["name"] == project["name"]] == [
         project["version"]
     ]
+    systems = [one.rpartition(" :: ")[2] for one in project["classifiers"] if "Operating" in one]
+    assert codemeta["operatingSystem"] == systems
+    # An address is that of the project, or there is none.
+    address = project["urls"].get("Repository")
+    assert codemeta.get("codeRepository") == address
+    assert re.findall(r"^repository-code: (.*)$", citation, re.M) == ([address] if address else [])
     assert codemeta["license"].endswith(project["license"])
     assert codemeta["description"] == project["description"]
     assert codemeta["keywords"] == project["keywords"]

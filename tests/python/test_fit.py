@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import shutil
+from concurrent.futures import Future
 from contextlib import contextmanager
 from types import SimpleNamespace
 
@@ -613,3 +614,20 @@ def test_without_emcee_it_is_reported_before_anything_is_simulated(monkeypatch):
     monkeypatch.setattr("mesoslip.inference.sampler.find_spec", lambda _: None)
     with pytest.raises(mesoslip.RunError, match="needs the package emcee"):
         mesoslip.fit(experiment(), fit_tables())
+
+
+def test_predictions_report_their_progress(monkeypatch):
+    """A fit goes on after its simulations, with predicted traces; a prediction has only those."""
+
+    def completed(_, __, pieces, **___):
+        for piece in pieces:
+            future = Future()
+            future.set_result([np.zeros(3)])
+            yield piece, future
+
+    monkeypatch.setattr(Simulations, "_completed", completed)
+    simulator = SimpleNamespace(forces=None, coarse_count=None)
+    parts = []
+    simulations = Simulations(simulator, expected=4, progress=parts.append)
+    assert len(list(simulations.forces(np.zeros((4, 1))))) == 4
+    assert parts == [0.25, 0.5, 0.75, 1.0]

@@ -71,7 +71,11 @@ def test_contacts_that_do_not_interact():
 
 def test_forces_of_scaled_contacts():
     """Equal contacts of the tables bear the force of the lattice, whose stiffnesses differ."""
-    field = mesoslip.mean_field(lattice(0.1, "run.realizations=2"))
+    parts = []
+    field = mesoslip.mean_field(lattice(0.1, "run.realizations=2"), progress=parts.append)
+    assert parts == sorted(parts)
+    assert parts[-1] == 1
+    assert any(0.4 < one < 0.6 for one in parts)
     assert field.lives.stiffness.std() > 0.05 * field.lives.stiffness.mean()
     assert field.summary["renewal_force"][0] == pytest.approx(field.settled_force, rel=0.01)
 

@@ -52,6 +52,69 @@ def test_numbers_of_kleins_case():
         assert part in text
 
 
+def text_of(kind, config, **attributes):
+    """The paragraph of a kind of output that has a configuration and attributes."""
+    coordinates = attributes.pop("coordinates", {})
+    return " ".join(
+        METHODS[kind](xr.DataTree(xr.Dataset(coords=coordinates, attrs=attributes)), config)
+    )
+
+
+@pytest.fixture(scope="module")
+def config():
+    return mesoslip.Config.load(ROOT / "runs" / "klein.toml")
+
+
+def test_slow_sliding_and_onset_have_no_delay(config):
+    """What curve and onset leave out is not said to be in them; steady sliding has no start."""
+    for kind in ("curve", "onset"):
+        text = text_of(kind, config, error=6.6e-14)
+        assert "breaks, and attaches again at once" in text
+        assert "τ_d" not in text
+        assert "At the start no contact bears a force." in text
+    assert "an estimated error of 7e-14 of the static force" in text_of(
+        "curve", config, error=7e-14
+    )
+    assert "melts at once and is dragged at the rate η = 2e11 1/s" in text_of("onset", config)
+    steady = text_of("steady", config, coordinates={"velocity": [1e-10, 1e-4]})
+    assert "At the start" not in steady
+    assert "τ_d = 500 µs" in steady
+    assert steady.endswith("Velocities are from 100 pm/s to 100 µm/s.")
+
+
+def test_a_continued_cycle_has_no_start_of_its_own(config):
+    settled = {"settled_motion": "smooth"}
+    assert "At the start" in text_of("cycle", config, **settled)
+    text = text_of("cycle", config, continued="true", **settled)
+    assert "from the state of an earlier cycle, until the oscillation had decayed" in text
+    assert "At the start" not in text
+
+
+def test_a_sweep_names_its_keys(config):
+    at = {"contacts.delay": [1e-4, 1e-3], "direction": ["up", "down"], "realization": [0, 1]}
+    text = text_of("sweep", config, coordinates=at)
+    assert "Varied were contacts.delay, up and down, with 2 realizations each;" in text
+
+
+def test_a_run_that_ended_early_does_not_last_as_long_as_its_drive(config):
+    times = {"time": [0.0, 1.0, 3.0]}
+    text = text_of("run", config, coordinates=times, ending="number of slips reached")
+    assert "for 12 s. It ended at 3 s: number of slips reached." in text
+    text = text_of("run", config, coordinates=times, ending="", complete="false")
+    assert "It ended at 3 s: it was interrupted." in text
+    whole = text_of("run", config, coordinates={"time": [0.0, 12.0]}, ending="end of the drive")
+    assert "ended" not in whole
+    endless = config.replace("run.duration=none", "run.avalanches=10", "slider.kind=quasistatic")
+    assert "until a condition is met." in text_of("run", endless)
+
+
+def test_thresholds_of_a_table_follow_no_law(config):
+    table = config.replace({"contacts.threshold": {"law": "table", "samples": [1.0, 1.5, 2.0]}})
+    text = text_of("run", table)
+    assert "their thresholds are those of a table of samples, with" in text
+    assert "table law" not in text
+
+
 def test_references_are_numbered_in_their_order():
     text, keys = numbered("A [@b; @a]. B [@c] and [@a].", ["c"])
     assert text == "A [2, 3]. B [1] and [3]."

@@ -11,8 +11,8 @@ from mesoslip.campaign.combination import Combination
 from mesoslip.campaign.sweep import groups, stored_measures
 from mesoslip.campaign.sweep_plan import Plan
 from mesoslip.execution.store import Pieces
+from mesoslip.simulation.memory import output_bytes
 from mesoslip.simulation.realization import Realization
-from mesoslip.simulation.recorded_tables import COLUMNS
 
 # Maximum number of combinations that are tried, and time for all of them [s].
 MAX_TRIED = 12
@@ -23,8 +23,6 @@ START_SECONDS = 1.5
 # Memory of a process with its imports, and size of a stored point [bytes].
 PROCESS_BYTES = 150e6
 POINT_BYTES = 4096
-# Ratio of compression of traces.
-COMPRESSED = 0.5
 
 
 @dataclass(frozen=True)
@@ -66,13 +64,21 @@ def estimate(plan: Plan, store: Pieces, workers: int) -> Estimate:
     # The runs of a chain follow one another.
     alone = max(longest, mean * max_chain)
     wall = max(mean * missing_count / workers, alone) + START_SECONDS if missing else 0.0
-    trace_bytes = max((_trace_bytes(one) for one in plan.combinations), default=0.0)
+    sizes = [_bytes(one, plan) for one in plan.combinations]
+    trace_bytes = max(sizes, default=0.0)
     # Three copies: in the tables of the kernel, in the tree, and in measures.
     memory = (workers + 1) * PROCESS_BYTES + 3 * workers * trace_bytes
     disk: float = plan.count * (POINT_BYTES + 8 * (1 + len(plan.measures)))
     if plan.sweep.traces:
-        disk += COMPRESSED * sum(map(_trace_bytes, plan.combinations)) * plan.realizations
+        disk += sum(sizes) * plan.realizations
     return Estimate(plan.count, stored_count, wall, memory, disk)
+
+
+def _bytes(combination: Combination, plan: Plan) -> float:
+    """Size of the record of a run; by default only kept outputs have finer traces of slips."""
+    config = combination.config
+    has_finer = plan.sweep.traces or config.output.slip_interval is not None
+    return output_bytes(config, has_finer=has_finer)
 
 
 def _seconds(combination: Combination, max_seconds: float) -> float:
@@ -82,10 +88,3 @@ def _seconds(combination: Combination, max_seconds: float) -> float:
         while not realization.finished and time.perf_counter() - start < max_seconds:
             realization.advance(work=2e4)
     return (time.perf_counter() - start) / max(realization.part_done, 1e-6)
-
-
-def _trace_bytes(combination: Combination) -> float:
-    """Size of the trace of a run, without the finer traces around slips."""
-    config = combination.config
-    samples = config.expected_duration / config.output_interval + 1
-    return 8.0 * samples * (len(COLUMNS["trace"]) + config.slider.layers_recorded(config))

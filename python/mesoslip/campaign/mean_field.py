@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from mesoslip.configuration import arguments
 from mesoslip.configuration.config import Config
 from mesoslip.errors import ConfigError, FileError, Problem, RunError
 from mesoslip.output.inputs import ConfigLike, as_config
@@ -268,7 +269,8 @@ class MeanField:
         return path, beside
 
 
-def mean_field(config: ConfigLike) -> MeanField:
+@arguments.checked(progress=arguments.function)
+def mean_field(config: ConfigLike, *, progress: Callable[[float], None] | None = None) -> MeanField:
     """Measure the stretches at which contacts of a lattice break and attach in slow sliding.
 
     Parameters
@@ -277,6 +279,8 @@ def mean_field(config: ConfigLike) -> MeanField:
         A run of contacts with interaction: a TOML file, an output, nested tables, or a `Config`.
         Its slider and drive do not matter here: the slider is moved slowly over ten mean breaking
         stretches from a relaxed start, without delay, in as many realizations as the run has.
+    progress
+        Called with the completed fraction, 0 to 1.
 
     Returns
     -------
@@ -300,9 +304,10 @@ def mean_field(config: ConfigLike) -> MeanField:
         raise ConfigError([Problem("", "contacts.reattach", message, False)])
     sliding = _sliding(checked)
     parts, forces = [], []
-    for number in range(checked.run.realizations):
+    count = checked.run.realizations
+    for number in range(count):
         with Realization(sliding, number) as one:
-            parts.append(_lives(one))
+            parts.append(_lives(one, progress, number, count))
             trace = one.table("trace")
         start = SETTLED * checked.contacts.break_stretch
         forces.append(trace["contact_force"][trace["displacement"] > start].mean())
@@ -327,7 +332,9 @@ def _sliding(config: Config) -> Config:
     return Config.from_dict(tables, "slow sliding")
 
 
-def _lives(one: Realization) -> ContactLives:
+def _lives(
+    one: Realization, progress: Callable[[float], None] | None, number: int, count: int
+) -> ContactLives:
     """Lives of the contacts of a realization, observed after each avalanche or a few of them.
 
     Breaks are placed at the mean displacement of these avalanches, exact with one at a time. Of a
@@ -339,6 +346,8 @@ def _lives(one: Realization) -> ContactLives:
     parts: list[tuple[Array, ...]] = []
     while not one.ending:
         one.advance(events)
+        if progress is not None:
+            progress((number + one.part_done) / count)
         now = one.contacts
         mean = displacement + (one.displacement - displacement) * (events + 1) / (2 * events)
         broken = np.flatnonzero(now["renewals"] > before["renewals"])

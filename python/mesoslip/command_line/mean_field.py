@@ -16,6 +16,7 @@ from mesoslip.command_line.options import (
     print_json,
     show,
 )
+from mesoslip.command_line.progress import progress_shown
 
 
 def mean_field(
@@ -42,7 +43,8 @@ def mean_field(
     checked = load(config, changes)
     if output is not None and output.resolve() == Path(config).resolve():
         raise FileError(f"{output}: is read by the command; give another name")
-    field = measure(checked)
+    with progress_shown(quiet=False) as progress:
+        field = measure(checked, progress=progress)
     written = () if output is None else field.write(output, FIRST if first else STEADY)
     if as_json:
         print_json({name: value for name, (value, *_) in field.summary.items()})

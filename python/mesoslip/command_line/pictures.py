@@ -17,9 +17,11 @@ from mesoslip.command_line.options import (
     quantity_or_none,
     time_of,
 )
+from mesoslip.command_line.progress import progress_shown
 
 # Endings of pictures and movies.
-FORMATS = (".png", ".pdf", ".svg", ".eps", ".ps", ".jpg", ".tif", ".webp", ".gif", ".mp4")
+MOVIES = (".gif", ".mp4")
+FORMATS = (".png", ".pdf", ".svg", ".eps", ".ps", ".jpg", ".tif", ".webp", *MOVIES)
 VIEW_HELP = "What to draw; each kind of output has a default"
 
 
@@ -126,7 +128,9 @@ def plot(
     there = [one for one in outputs if is_file(one)]
     if there:
         targets.check_writable(path, there)
-    with hidden():
+    # A picture is drawn at once.
+    is_quick = path.suffix.lower() not in MOVIES
+    with hidden(), progress_shown(is_quick, "drawing") as progress:
         plots.plot(
             outputs,
             path,
@@ -141,6 +145,7 @@ def plot(
             title=title,
             letters=letters,
             style=style,
+            progress=progress,
         )
     typer.echo(str(path), err=True)
 

@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 
 # Exit status after Ctrl-C.
 INTERRUPTED = 130
+# Expected size of an output that is reported before the run [bytes].
+LARGE = 5e8
 # Rows of the trace that are read at once.
 MAX_ROWS = 400_000
 
@@ -66,7 +68,7 @@ def run(
     """
     from mesoslip.output import files, targets, writing
     from mesoslip.simulation.checkpoint import Checkpoint, checkpoint_folder
-    from mesoslip.simulation.memory import check_memory
+    from mesoslip.simulation.memory import check_memory, output_bytes
     from mesoslip.simulation.run_realizations import run_realizations
 
     checked = load(config, changes)
@@ -82,6 +84,12 @@ def run(
     if not quiet and files.is_of_another(path, checked):
         report(
             "the output of another configuration will be replaced at the end; -o gives another name"
+        )
+    expected = output_bytes(checked)
+    if not quiet and expected > LARGE:
+        report(
+            f"the output will take about {expected / 1e9:.2g} GB; output.interval and "
+            "output.slip_interval set how fine it is"
         )
     folder = checkpoint_folder(path)
     with (
@@ -99,7 +107,9 @@ def run(
         if not results.complete:
             raise typer.Exit(_keep(results, path, stop, checkpoint))
         try:
-            writing.write_results(results, path, threads=workers or os.cpu_count() or 1)
+            threads = workers or os.cpu_count() or 1
+            with progress_shown(quiet, "writing") as progress:
+                writing.write_results(results, path, threads=threads, progress=progress)
         except FileError as error:
             if checkpoint.write(results.realizations):
                 raise FileError(

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from mesoslip.command_line.options import SavedOption, counted
+from mesoslip.command_line.progress import steps_shown
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -99,33 +101,41 @@ def trace(
     path = output or Path("out") / f"{Path(file.stem).stem if is_packed else file.stem}.nc"
     if not dry_run:
         targets.check_output(path, [file, *([] if config is None else [config])])
-    understood = understand(
-        file,
-        config=config,
-        headers=columns,
-        decimal=decimal,
-        rate=rate,
-        velocity=velocity,
-        stiffness=stiffness,
-        normal_force=normal_force,
-        normal_stress=normal_stress,
-        area=area,
-        start=start,
-        end=end,
-        hum=hum,
-        trend=trend,
-        noise=noise,
-        period=period,
-        part=part,
-        min_fall=min_fall,
-    )
-    for line in understood.report if verbose else understood.summary:
+    began = time.monotonic()
+    with steps_shown(began) as step:
+        step("reading")
+        understood = understand(
+            file,
+            config=config,
+            headers=columns,
+            decimal=decimal,
+            rate=rate,
+            velocity=velocity,
+            stiffness=stiffness,
+            normal_force=normal_force,
+            normal_stress=normal_stress,
+            area=area,
+            start=start,
+            end=end,
+            hum=hum,
+            trend=trend,
+            noise=noise,
+            period=period,
+            part=part,
+            min_fall=min_fall,
+        )
+        step("estimating the noise")
+        report = understood.report if verbose else understood.summary
+    for line in report:
         typer.echo(line)
     if dry_run:
         return
     targets.check_output(path, [understood.path])
-    tree = trace_of(understood)
-    writing.write(tree, path)
+    with steps_shown(began) as step:
+        step("looking for slips")
+        tree = trace_of(understood)
+        step("writing")
+        writing.write(tree, path)
     typer.echo(f"{path}: {', '.join(_summary(tree))}", err=True)
     if tree.attrs.get("comment"):
         typer.echo(f"{path}: {tree.attrs['comment']}", err=True)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import functools
 import html
 import math
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Self
@@ -102,6 +102,19 @@ class Config(Table):
             return self.model_validate(self._base)
         except ConfigError:
             return None
+
+    def adapted(self, change: Callable[[Config], Config]) -> Config:
+        """The configuration after a change by the program, which its base has too.
+
+        So both differ in what the user has changed.
+        """
+        made, base = change(self), self.base
+        made._base = None
+        if base is not None:
+            # The base by itself may not allow the change.
+            with suppress(ConfigError):
+                made._base = change(base).to_dict()
+        return made
 
     @property
     def dropped(self) -> tuple[str, ...]:
@@ -384,7 +397,13 @@ class Config(Table):
             If anything in it is wrong.
         """
         old = self.to_dict()
-        return self._checked(override(Merged(old), (*changes, tables)), "configuration", old)
+        base = old if self._base is None else self._base
+        return self._checked(override(Merged(old), (*changes, tables)), "configuration", base)
+
+    @property
+    def own_title(self) -> str | None:
+        """The title, unless it is that of the base."""
+        return self.title if self.base is None or self.base.title != self.title else None
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
         """A copy, with other tables if given, which are checked."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import os
 from collections.abc import Callable
@@ -145,7 +146,8 @@ def settled_cycle(
         if found and abs(found[0]) >= 1:
             variation = variation_after(motion, settled, MODULATION, CYCLES_AFTER)
             steps += CYCLES_AFTER
-    return _cycle_of(config, settled, found, is_stable, steps, variation)
+    cycle = _cycle_of(config, settled, found, is_stable, steps, variation)
+    return dataclasses.replace(cycle, is_continued=words is not None)
 
 
 def _cycle_of(
@@ -217,6 +219,10 @@ def master_equation(config: Config) -> Config:
 
     The drive moves in the positive direction: a motion under the opposite drive is a mirror image.
     """
+    return config.adapted(_master_equation)
+
+
+def _master_equation(config: Config) -> Config:
     problems = []
     if config.slider.oscillator is None:
         message = "must be rigid: other sliders have no cycles here"

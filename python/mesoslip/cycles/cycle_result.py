@@ -117,6 +117,8 @@ class Cycle:
     state: Words = field(repr=False)
     section: Level | None = field(repr=False)
     _trace: Trace = field(repr=False)
+    is_continued: bool = False
+    """Whether it started from the state of an earlier cycle."""
 
     @property
     def amplitude_ratio(self) -> float:
@@ -175,6 +177,8 @@ class Cycle:
             if value is not None:
                 attributes[name] = str(value).lower() if isinstance(value, bool) else value
         attributes["comment"] = self.verdict
+        if self.is_continued:
+            attributes["continued"] = "true"
         if self.section is not None:
             attributes["section_force"] = self.section.force
             attributes["section_reset"] = self.section.reset

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from mesoslip.configuration.config import Config
-from mesoslip.configuration.files import Change, on_base, override, read_toml
+from mesoslip.configuration.files import Change, base_of, on_base, override, read_toml
 from mesoslip.configuration.keys import KeyKind, key_kind, nearest_keys
 from mesoslip.configuration.units import to_si
 from mesoslip.errors import ConfigError, Problem
@@ -68,7 +68,8 @@ class Plan:
         Known properties of the apparatus according to the traces replace missing keys.
         """
         path = Path(path)
-        return cls._checked(override(read_toml(path), overrides).tables, str(path), known)
+        base = base_of(path)
+        return cls._checked(override(read_toml(path), overrides).tables, str(path), known, base)
 
     @classmethod
     def from_dict(
@@ -81,7 +82,13 @@ class Plan:
         return cls._checked(on_base(tables, source, Path()).tables, source, known)
 
     @classmethod
-    def _checked(cls, tables: Mapping[str, Any], source: str, known: Known | None) -> Plan:
+    def _checked(
+        cls,
+        tables: Mapping[str, Any],
+        source: str,
+        known: Known | None,
+        base: Mapping[str, Any] | None = None,
+    ) -> Plan:
         tables = {
             name: dict(one) if isinstance(one, Mapping) else one for name, one in tables.items()
         }
@@ -103,6 +110,9 @@ class Plan:
             assumed = known.complete(tables, free)
         for one in free:
             _place(tables, one)
+        if base is not None and base.get("title") == tables.get("title"):
+            # A title of the base is not that of the traces.
+            tables.pop("title", None)
         config = Config.from_dict(tables, source)
         for one in free:
             reader.check_range(one, config)

@@ -115,7 +115,9 @@ def build_tree(fitted: FitResult) -> xr.DataTree:
     needs = needed_groups(prior, fitted.information)
     notes = warnings(prior, estimate.draws, fitted.agreement, r_hat(estimate.chains), needs)
     first = fitted.predictions[0].experiment
+    names = [one.experiment.name for one in fitted.predictions]
     attributes: dict[str, Any] = {
+        "title": plan.config.title or f"Fit of {', '.join(names)}",
         "seed": plan.seed,
         "complete": "true",
         "noise": first.noise.deviation,
@@ -126,7 +128,7 @@ def build_tree(fitted: FitResult) -> xr.DataTree:
         "disagreeing": "\n".join(fitted.agreement.disagreeing),
         "coverage_50": estimate.coverage[0],
         "coverage_90": estimate.coverage[1],
-        "traces": "\n".join(one.experiment.name for one in fitted.predictions),
+        "traces": "\n".join(names),
         "warnings": "\n".join(notes),
         "notes": "\n".join(_notes(fitted)),
     }

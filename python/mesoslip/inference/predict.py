@@ -107,6 +107,7 @@ def predict(
     agreement = compare(simulator.features, used, used, np.where(left_out, np.nan, observed))
     kept = {f"/{name}": fitted[name].to_dataset() for name in ("posterior", "prior", "parameters")}
     attributes = fitted.attrs | {
+        "title": f"Prediction of {experiment.name}",
         "noise": experiment.noise.deviation,
         "setup_period": experiment.summarizer.period,
         "agreement_probability": agreement.probability,

@@ -188,8 +188,10 @@ class Simulations:
         """
         first = self._expected + len(self)
         pieces = [(number, point, False) for number, point in enumerate(points, first)]
-        for _, future in self._completed(self.simulator.forces, pieces, in_order=True):
+        work = self._completed(self.simulator.forces, pieces, in_order=True)
+        for done, (_, future) in enumerate(work, 1):
             forces = future.result()
+            self._progress(min(1.0, (len(self) + done) / self._expected))
             if forces is not None:
                 yield forces
 

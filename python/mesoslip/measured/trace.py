@@ -353,12 +353,12 @@ def _as_measured(config: Config, record: Record, title: str) -> Config:
         float(f"{one:.9g}") for one in (time[-1] - time[0], np.median(np.diff(time)))
     )
     changes: dict[str, Any] = {
-        "title": config.title or title,
+        "title": config.own_title or title,
         "output.interval": min(interval, duration),
     }
     if not config.drive.parts:
         changes["run.duration"] = duration
-    return config.replace(changes)
+    return config.adapted(lambda one: one.replace(changes))
 
 
 def _drive(

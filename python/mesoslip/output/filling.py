@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -62,6 +62,27 @@ def blocks(results: Results, layout: Mapping[str, GroupLayout]) -> Iterator[Bloc
                 is_whole = len(where) == 1 or where[0] == longest
                 entries = of_table if is_whole else padded
                 yield Block(group, entries, where, parts, owners)
+
+
+def row_count(results: Results, layout: Mapping[str, GroupLayout]) -> int:
+    """Number of rows of all tables of an output."""
+    tables = [
+        one
+        for form in layout.values()
+        for one in dict.fromkeys(entry.table for entry in form.entries.values() if entry.table)
+    ]
+    return sum(len(each.rows(one)) for each in results.realizations for one in tables)
+
+
+def reported(
+    blocks: Iterable[Block], rows: int, progress: Callable[[float], None]
+) -> Iterator[Block]:
+    """Blocks, with calls of ``progress`` with the fraction of the rows that came before."""
+    done = 0
+    for block in blocks:
+        yield block
+        done += sum(map(len, block.parts))
+        progress(done / max(rows, 1))
 
 
 def block_rows(config: Config, table: str) -> int:

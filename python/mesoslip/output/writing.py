@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -49,10 +50,17 @@ def _encoding(data: xr.Dataset) -> dict[str, dict[str, Any]]:
     return encoding
 
 
-def write_results(results: Results, path: Path, *, threads: int = 1) -> None:
+def write_results(
+    results: Results,
+    path: Path,
+    *,
+    threads: int = 1,
+    progress: Callable[[float], None] | None = None,
+) -> None:
     """Write the results of a run block by block, compressed on threads.
 
-    The file equals that of `write` for the tree of `mesoslip.output.tree.build_tree`.
+    The file equals that of `write` for the tree of `mesoslip.output.tree.build_tree`. ``progress``
+    is called with the written fraction, 0 to 1.
     """
     groups = layout.describe(results)
     with written_whole(path, is_output=True) as part, LOCK:
@@ -60,7 +68,10 @@ def write_results(results: Results, path: Path, *, threads: int = 1) -> None:
             for name, form in groups.items():
                 place = file.createGroup(name) if name else file
                 _create_group(place, form, groups[""], results.config)
-        write_chunks(part, filling.blocks(results, groups), threads)
+        blocks = filling.blocks(results, groups)
+        if progress is not None:
+            blocks = filling.reported(blocks, filling.row_count(results, groups), progress)
+        write_chunks(part, blocks, threads)
 
 
 def _create_group(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 import subprocess
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -44,7 +44,9 @@ class Movie:
     count: int
     show: Callable[[int], None]
 
-    def frames(self) -> Iterator[NDArray[np.uint8]]:
+    def frames(
+        self, progress: Callable[[float], None] | None = None
+    ) -> Iterator[NDArray[np.uint8]]:
         """The frames, shape (height, width, 3)."""
         self.figure.set_dpi(DPI)
         canvas = FigureCanvasAgg(self.figure)
@@ -55,6 +57,8 @@ class Movie:
             self.figure.set_layout_engine("none")
             frame = np.asarray(canvas.buffer_rgba())  # type: ignore[no-untyped-call]
             yield frame[..., :3].copy()
+            if progress is not None:
+                progress((number + 1) / self.count)
 
 
 def chosen_frames(times: Array, activity: Array, count: int = MAX_FRAMES) -> NDArray[np.intp]:
@@ -77,15 +81,15 @@ def time_bar(axes: Axes) -> Any:
     return axes.axvline(0, color=RED, linewidth=1.0)
 
 
-def write(movie: Movie, path: Path) -> None:
-    """Write a movie, a .gif or an .mp4."""
+def write(movie: Movie, path: Path, progress: Callable[[float], None] | None = None) -> None:
+    """Write a movie, a .gif or an .mp4; ``progress`` is called with the drawn share of frames."""
     if path.suffix.lower() == ".mp4":
         program = _ffmpeg(path)
         with written_whole(path) as part:
-            _write_mp4(movie, part, program)
+            _write_mp4(movie.frames(progress), part, program)
     else:
         with written_whole(path) as part:
-            _write_gif(list(movie.frames()), part)
+            _write_gif(list(movie.frames(progress)), part)
 
 
 def _write_gif(frames: list[NDArray[np.uint8]], path: Path) -> None:
@@ -123,9 +127,9 @@ def _ffmpeg(path: Path) -> str:
     return found
 
 
-def _write_mp4(movie: Movie, path: Path, program: str) -> None:
+def _write_mp4(frames: Iterable[NDArray[np.uint8]], path: Path, program: str) -> None:
     process = None
-    for frame in movie.frames():
+    for frame in frames:
         # The codec needs even sizes.
         height, width = (size - size % 2 for size in frame.shape[:2])
         if process is None:

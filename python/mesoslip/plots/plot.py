@@ -6,7 +6,7 @@ import itertools
 import math
 import operator
 import string
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 
 import matplotlib as mpl
@@ -47,6 +47,7 @@ def plot(
     title: str | None = None,
     letters: bool = False,
     style: PathLike | None = None,
+    progress: Callable[[float], None] | None = None,
 ) -> Figure | SubFigure:
     """Draw an output of any command, or several of one command over each other.
 
@@ -92,6 +93,8 @@ def plot(
         Whether panels have the letters (a), (b), and so on.
     style
         Style file of matplotlib (``.mplstyle``), laid over that of mesoslip.
+    progress
+        Called with the fraction of the frames of a movie that are drawn, 0 to 1.
 
     Returns
     -------
@@ -140,7 +143,7 @@ def plot(
         if path is not None and is_movie:
             with styled():
                 film = movie_of(trees[0], view, options)
-                write(film, path)
+                write(film, path, progress)
             return film.figure
         drawn = draw(trees, names, view, options, figure=figure, axes=ax)
         if ax is None:

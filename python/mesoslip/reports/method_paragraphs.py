@@ -20,7 +20,9 @@ from mesoslip.configuration.sliders.layered import LayeredSlider
 from mesoslip.configuration.sliders.prescribed import PrescribedSlider
 from mesoslip.configuration.sliders.quasistatic import QuasistaticSlider
 from mesoslip.configuration.sliders.rigid import RigidSlider
+from mesoslip.configuration.threshold_laws import LAWS
 from mesoslip.errors import ConfigError, Problem
+from mesoslip.output.arrays import Tree
 from mesoslip.output.kinds import kind_of
 from mesoslip.quantities import column, with_unit
 
@@ -42,6 +44,8 @@ COUPLINGS = {
 }
 # Significant digits of parameters.
 DIGITS = 6
+# Share of the duration before whose end a run ended early.
+EARLY = 1e-3
 ENERGY = "The balance of energy closes to {residual:.0e} of the work of the drive."
 
 
@@ -52,18 +56,23 @@ def quantity(value: float, unit: str) -> str:
 
 def run_method(tree: xr.DataTree, config: Config) -> Iterator[str]:
     yield from _engine(config)
-    yield from model(config)
+    yield from model(config, _run_length(config))
+    yield from _early_end(tree, config)
     yield from _accuracy(tree, config)
 
 
-def curve_method(_: xr.DataTree, config: Config) -> Iterator[str]:
-    tolerance = f"{config.curve.tolerance:.0e}".replace("e-0", "e-")
+def curve_method(tree: xr.DataTree, config: Config) -> Iterator[str]:
+    error = ""
+    if "error" in tree.attrs:
+        size = f"{float(tree.attrs['error']):.0e}".replace("e-0", "e-")
+        error = f", with an estimated error of {size} of the static force"
     yield (
         "The force F(X) of slow sliding was computed for infinitely many contacts of the "
         f"{MODEL} with mesoslip [@mesoslip]: the master equation [@braun2010] is solved as a "
-        f"renewal equation, with an error of at most {tolerance} of the static force."
+        f"renewal equation{error}."
     )
-    yield from _contacts(config)
+    yield from _contacts(config, is_slow=True)
+    yield INITIAL[config.contacts.initial]
 
 
 # Ends of the sentence on the iteration to each settled motion.
@@ -76,11 +85,13 @@ SETTLED = {
 
 def cycle_method(tree: xr.DataTree, config: Config) -> Iterator[str]:
     yield from _engine(config)
+    is_continued = tree.attrs.get("continued") == "true"
+    start = ", from the state of an earlier cycle" if is_continued else ""
     yield (
-        "It was iterated from one passage of the spring force through a section to the next, "
-        f"{SETTLED[str(tree.attrs['settled_motion'])]}."
+        "It was iterated from one passage of the spring force through a section to the next"
+        f"{start}, {SETTLED[str(tree.attrs['settled_motion'])]}."
     )
-    yield from model(config, is_run=False)
+    yield from model(config, has_start=not is_continued)
 
 
 def branches_method(tree: xr.DataTree, config: Config) -> Iterator[str]:
@@ -90,7 +101,7 @@ def branches_method(tree: xr.DataTree, config: Config) -> Iterator[str]:
         "to the next, from the state of the value before, up and down over "
         f"{tree.attrs['continued_key']}."
     )
-    yield from model(config, is_run=False)
+    yield from model(config)
 
 
 def lyapunov_method(tree: xr.DataTree, config: Config) -> Iterator[str]:
@@ -99,33 +110,42 @@ def lyapunov_method(tree: xr.DataTree, config: Config) -> Iterator[str]:
         f"The largest Lyapunov exponent is the rate at which {tree.sizes['twin']} twins depart "
         "from the run: they start a small distance away, with the same random numbers."
     )
-    yield from model(config)
+    yield from model(config, _run_length(config))
 
 
-def steady_method(_: xr.DataTree, config: Config) -> Iterator[str]:
+def steady_method(tree: xr.DataTree, config: Config) -> Iterator[str]:
     yield (
         f"The force of steady sliding of the {MODEL}, and its linear stability, were computed "
         "with mesoslip [@mesoslip] for infinitely many contacts, from the survival of contacts "
         "over their lives and its change under a small oscillation of the slider."
     )
-    yield from model(config, is_run=False)
+    yield from _contacts(config)
+    yield slider_sentence(config.slider)
+    if "velocity" in tree.coords:
+        ends = (quantity(float(one), "m/s") for one in tree["velocity"].values[[0, -1]])
+        yield f"Velocities are from {' to '.join(ends)}."
 
 
 def onset_method(_: xr.DataTree, config: Config) -> Iterator[str]:
+    drag = ""
+    if config.contacts.drag_rate:
+        drag = f" and is dragged at the rate η = {quantity(config.contacts.drag_rate, '1/s')}"
     yield (
         f"The onset of slip of the {MODEL} was computed with mesoslip [@mesoslip], from the "
         "force curve of the master equation [@braun2010], for contacts that break one after "
-        "another and for a film that melts at once."
+        f"another and for a film that melts at once{drag}."
     )
-    yield from model(config, is_run=False)
+    yield from model(config, is_slow=True)
 
 
 def sweep_method(tree: xr.DataTree, config: Config) -> Iterator[str]:
-    keys = ", ".join(str(name) for name in tree.coords if name != "realization")
+    # Others are realizations, directions and numbers of samples.
+    keys = ", ".join(str(name) for name in tree.coords if "." in str(name))
     count = tree.sizes.get("realization", 1)
     each = f", with {count} realizations each" if count > 1 else ""
     yield from _engine(config)
-    yield from model(config)
+    yield from model(config, _run_length(config))
+    each = (", up and down" if "direction" in tree.coords else "") + each
     yield f"Varied were {keys}{each}; values above of these keys are those of the base."
 
 
@@ -148,14 +168,23 @@ def fit_method(tree: xr.DataTree, config: Config) -> Iterator[str]:
         config = config.replace(values)
     except ConfigError:
         note = f"Values above of {', '.join(values)} are not those of the fit."
-    yield (
-        f"Parameters of the {MODEL} were estimated with mesoslip [@mesoslip] from a measured "
-        f"force (median, interval of 90 %): {estimates}. The trace and "
-        f"{tree.attrs['simulation_count']} simulations of it, with its sampling and noise, are "
-        "reduced to the same summaries, and parameters are drawn from a synthetic likelihood "
-        "of these [@wood2010] by an affine-invariant ensemble sampler [@foreman2013]."
+    is_predicted = tree.attrs.get("predicted") == "true"
+    count = 1 if is_predicted else len(str(tree.attrs.get("traces", "")).split("\n"))
+    what, those, its = (
+        ("a measured force", "The trace", "of it, with its")
+        if count == 1
+        else (f"{count} measured forces", "The traces", "of them, with their")
     )
-    yield from model(config, is_run=False)
+    yield (
+        f"Parameters of the {MODEL} were estimated with mesoslip [@mesoslip] from {what} (median, "
+        f"interval of 90 %): {estimates}. {those} and {tree.attrs['simulation_count']} "
+        f"simulations {its} sampling and noise, are reduced to the same summaries, and parameters "
+        "are drawn from a synthetic likelihood of these [@wood2010] by an affine-invariant "
+        "ensemble sampler [@foreman2013]."
+    )
+    if is_predicted:
+        yield f"The trace {tree.attrs['traces']}, not in the fit, is predicted by these draws."
+    yield from model(config)
     yield note
 
 
@@ -194,12 +223,22 @@ def measured_method(tree: xr.DataTree) -> str:
     )
 
 
-def model(config: Config, *, is_run: bool = True) -> Iterator[str]:
-    """Sentences on contacts, slider and drive, which has a duration in a run only."""
-    yield from _contacts(config)
-    yield INITIAL[config.contacts.initial]
+def model(
+    config: Config, length: str = "", *, has_start: bool = True, is_slow: bool = False
+) -> Iterator[str]:
+    """Sentences on contacts, slider and drive.
+
+    Only a run has a length. Contacts start from their initial state, or from another one; in slow
+    sliding their delay and drag do not matter.
+    """
+    yield from _contacts(config, is_slow=is_slow)
+    if has_start:
+        yield INITIAL[config.contacts.initial]
     yield slider_sentence(config.slider)
-    yield _drive(config.drive, config) if is_run else f"{_motion(config.drive)}."
+    yield f"{_motion(config.drive)}{length}."
+    several = config.run.realizations
+    if length and several > 1:
+        yield f"{several} realizations have the seed {config.run.seed}."
 
 
 def _engine(config: Config) -> Iterator[str]:
@@ -213,34 +252,36 @@ def _engine(config: Config) -> Iterator[str]:
         )
 
 
-def _contacts(config: Config) -> Iterator[str]:
+def _contacts(config: Config, *, is_slow: bool = False) -> Iterator[str]:
     contacts = config.contacts
     count = f"N = {contacts.count}" if config.contact_kind.is_discrete else "Infinitely many"
     law = contacts.threshold
+    is_sampled = LAWS[law.law].is_sampled
+    spread = "are those of a table of samples," if is_sampled else f"follow the {law.law} law"
     yield (
         f"{count} contacts have the total stiffness "
         f"Nk = {quantity(contacts.stiffness, 'N/m')} and the total static force "
         f"F_s = {quantity(contacts.static_force, 'N')}; their thresholds "
-        f"follow the {law.law} law with a relative standard deviation of "
+        f"{spread} with a relative standard deviation of "
         f"{law.relative_width:.6g}, and {COUPLINGS[contacts.coupling]}."
     )
-    yield _lives(config)
+    yield _lives(config, is_slow=is_slow or config.slider.ignores_delay)
     for key, feature in config.contact_features.items():
         yield feature_sentence(feature, key, config)
 
 
-def _lives(config: Config) -> str:
-    """The sentence on breaking contacts."""
+def _lives(config: Config, *, is_slow: bool) -> str:
+    """The sentence on breaking contacts; in slow sliding they attach at once, without drag."""
     contacts = config.contacts
     if not contacts.reattach:
         return "A contact that reaches its threshold breaks for good."
     drag = ""
-    if contacts.drag and not config.slider.ignores_delay:
+    if contacts.drag and not is_slow:
         drag = f"is dragged (all together: Nmη = {quantity(contacts.drag, 'N s/m')}), "
-    elif contacts.drag_rate and not config.slider.ignores_delay:
+    elif contacts.drag_rate and not is_slow:
         drag = f"is dragged at the rate η = {quantity(contacts.drag_rate, '1/s')}, "
     wait = "at once"
-    if contacts.delay and not config.slider.ignores_delay:
+    if contacts.delay and not is_slow:
         delay = quantity(contacts.delay, "s")
         drawn = " drawn from the exponential law of mean" if contacts.delay_law != "fixed" else ""
         wait = f"after a delay{drawn} τ_d = {delay}"
@@ -305,7 +346,7 @@ def _renewal(renewal: str, key: str, config: Config) -> str:  # noqa: ARG001
 @feature_sentence.register
 def _interaction(lattice: Interaction, key: str, config: Config) -> str:  # noqa: ARG001
     return (
-        f"They interact with their neighbours on a periodic {lattice.lattice} lattice of "
+        f"Contacts interact with their neighbours on a periodic {lattice.lattice} lattice of "
         f"{lattice.columns} × {lattice.rows} sites, with the strength ξ = {lattice.strength:g}."
     )
 
@@ -368,11 +409,23 @@ def _under_a_force(slider: ForceSlider) -> str:
     return f"The slider is a rigid mass M = {quantity(slider.mass, 'kg')} {damping}."
 
 
-def _drive(drive: Drive, config: Config) -> str:
-    run = f"for {quantity(config.duration, 's')}" if math.isfinite(config.duration) else ""
-    several = config.run.realizations
-    seeds = f" {several} realizations have the seed {config.run.seed}." if several > 1 else ""
-    return f"{_motion(drive)} {run}".rstrip() + f".{seeds}"
+def _run_length(config: Config) -> str:
+    """The end of the sentence on the drive of a run."""
+    finite = math.isfinite(config.duration)
+    return f" for {quantity(config.duration, 's')}" if finite else " until a condition is met"
+
+
+def _early_end(tree: Tree, config: Config) -> Iterator[str]:
+    """A sentence on a run that ended before its drive."""
+    data = tree.to_dataset()
+    if "time" not in data or not len(data["time"].values):
+        return
+    end, ending = float(data["time"].values[-1]), str(tree.attrs.get("ending", ""))
+    if tree.attrs.get("complete") == "false":
+        ending = "it was interrupted"
+    if end < (1 - EARLY) * config.duration and ending:
+        which = "It" if config.run.realizations == 1 else "The longest realization"
+        yield f"{which} ended at {quantity(end, 's')}: {ending}."
 
 
 def _motion(drive: Drive) -> str:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mesoslip.errors import ConfigError, Problem
+from mesoslip.simulation.recorded_tables import COLUMNS, SNAPSHOT_NUMBERS
 
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
@@ -34,6 +35,26 @@ def free_memory() -> int:
         return machine_memory()
 
 
+def finer_samples(config: Config) -> float:
+    """Expected number of finer samples around the slips of a realization."""
+    fine = config.slip_interval
+    return 0.0 if fine is None else config.slider.time_in_slips(config) / fine
+
+
+def output_bytes(config: Config, *, has_finer: bool = True) -> float:
+    """Expected size of the output of a run, or of its tables in memory [bytes].
+
+    It counts the trace, snapshots at given times, and finer samples around slips if there are any.
+    """
+    samples = config.expected_duration / config.output_interval + 1
+    layers = config.slider.layers_recorded(config)
+    numbers = samples * (len(COLUMNS["trace"]) + layers)
+    numbers += has_finer * finer_samples(config) * len(COLUMNS["slip_trace"])
+    snapshots = len(config.output.snapshots) * config.contacts.count
+    numbers += snapshots * len(SNAPSHOT_NUMBERS)
+    return 8.0 * numbers * config.run.realizations
+
+
 def check_memory(config: Config, available: float | None = None) -> None:
     """Refuse a run whose record exceeds the available memory [bytes], by default the machine's.
 
@@ -45,8 +66,7 @@ def check_memory(config: Config, available: float | None = None) -> None:
     together = min(run.realizations, os.cpu_count() or 1)
     in_catalogue = (run.avalanches or 0) if output.avalanche_size is None else 0
     per_sample = BYTES_PER_SAMPLE + BYTES_PER_LAYER * config.slider.layers_recorded(config)
-    fine = config.slip_interval
-    finer = 0.0 if fine is None else config.slider.time_in_slips(config) / fine
+    finer = finer_samples(config)
     lattices = BYTES_PER_CONTACT_IN_SNAPSHOT * contacts.count * run.realizations
     after = 0.0 if output.snapshot_size is None else _breaks(config) / output.snapshot_size
     problems = []
@@ -62,7 +82,11 @@ def check_memory(config: Config, available: float | None = None) -> None:
             output.snapshot_size,
         ),
         ("output.interval", per_sample * samples * run.realizations, config.output_interval),
-        ("output.slip_interval", BYTES_PER_SAMPLE_OF_SLIP * finer * run.realizations, fine),
+        (
+            "output.slip_interval",
+            BYTES_PER_SAMPLE_OF_SLIP * finer * run.realizations,
+            config.slip_interval,
+        ),
     ):
         if needed > memory:
             message = (

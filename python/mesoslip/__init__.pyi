@@ -10,6 +10,7 @@ from .campaign.mean_field import mean_field
 from .campaign.sweep import sweep
 from .configuration.config import Config
 from .configuration.threshold_law import ThresholdLaw
+from .configuration.track_strength import track_strength
 from .cycles.branch import branches
 from .cycles.cycle import cycle
 from .cycles.cycle_result import Cycle
@@ -27,6 +28,7 @@ from .theory.contacts.plain_sliding import SteadySliding
 from .theory.curve import curve
 from .theory.derived import derived
 from .theory.slip_onset import onset
+from .theory.track_response import TrackResponse
 
 __all__ = [
     "Config",
@@ -41,6 +43,7 @@ __all__ = [
     "SteadySliding",
     "Threads",
     "ThresholdLaw",
+    "TrackResponse",
     "avalanche_summary",
     "avalanches",
     "branches",
@@ -64,5 +67,6 @@ __all__ = [
     "run",
     "slips",
     "sweep",
+    "track_strength",
     "write_table",
 ]

@@ -7,9 +7,9 @@ import math
 import mesoslip
 import numpy as np
 import pytest
-from mesoslip import Config
+from mesoslip import Config, ConfigError, TrackResponse, track_strength
 from mesoslip.configuration.contacts.tables import Track
-from oracles import relative_strength
+from oracles import relative_strength, stationary_force
 
 CORRELATIONS = {
     "gaussian": lambda distance: np.exp(-0.5 * distance**2),
@@ -84,3 +84,156 @@ def test_strength_depends_on_the_place_alone(correlation):
     edge = 0.3 * (np.arange(-50, 50) + 0.5)
     below, above = (relative_strength(one, 7, 2, edge + far) for far in (-1e-9, 1e-9))
     assert np.max(np.abs(above - below)) < 1e-5
+
+
+def linear_force(config, x, spacing):
+    """F + w ∫ χ(q) ĝ(q) e^(iqX) dq at displacements of a run from the linear theory."""
+    theory = TrackResponse(config)
+    around = np.arange(-20.0, x[-1] + 20.0, spacing)
+    g = (track_strength(config, around) - 1) / theory.track.spread
+    q = 2 * np.pi * np.fft.rfftfreq(len(around), spacing)
+    # Shorter waves average out.
+    response = np.where(q < 60, theory.response(np.minimum(q, 60)), 0)
+    change = np.fft.irfft(np.fft.rfft(g) * response, len(around))
+    steady = stationary_force(config, config.drive.velocity)
+    return steady + theory.track.spread * np.interp(x, around, change)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"contacts.track": track(0.01, 0.7)},
+        {"contacts.track": track(0.01, 1.0, "exponential")},
+        {"contacts.coupling": "scaled", "contacts.back_force_ratio": 0.2},
+        {"contacts.delay": 0.4},
+        {"contacts.delay": 0.3, "contacts.delay_law": "exponential"},
+    ],
+    ids=["gaussian", "exponential", "scaled, back force", "delay", "exponential delays"],
+)
+def test_the_force_is_that_of_the_linear_theory(changes):
+    """At each place, from the strength there and before."""
+    tables = unit_tables(
+        track=track(0.01, 0.7), threshold={"law": "gaussian", "relative_width": 0.2}
+    )
+    config = Config.from_dict(tables).replace(
+        {"run.engine": "me", "run.duration": 50.0, "contacts.initial": "steady"}, changes
+    )
+    x, force = (one[0] for one in forces(config.to_dict()))
+    expected = linear_force(config, x, 1 / 32)
+    settled = x > 30
+    deviation = np.std(expected[settled])
+    assert deviation > 0.0025
+    assert np.std((force - expected)[settled]) < 0.06 * deviation
+    assert np.mean((force - expected)[settled]) == pytest.approx(0.0, abs=0.04 * deviation)
+
+
+@pytest.mark.parametrize(("spread", "length", "expected"), [(0.03, 0.3, 0.0261), (0.1, 1, 0.0673)])
+def test_the_deviation_of_the_force(spread, length, expected):
+    """Known values; that of the spectrum, and that of `info`."""
+    config = Config.from_dict(unit_tables(track=track(spread, length, "exponential")))
+    theory = TrackResponse(config)
+    assert theory.force_deviation == pytest.approx(expected, abs=5e-5)
+    assert mesoslip.derived(config)["track_force_deviation"].value == theory.force_deviation
+    q = np.linspace(0, 80, 4001)
+    spectrum = theory.force_spectrum(q)
+    assert math.sqrt(2 * np.trapezoid(spectrum, q)) == pytest.approx(expected, rel=1e-3)
+    tree = mesoslip.curve(config)
+    assert tree["track"].attrs["force_deviation"] == theory.force_deviation
+    # chi(0) is the force: a uniform strength multiplies it.
+    assert tree["track"]["response"].values[0] == pytest.approx(tree.attrs["F_steady"], rel=1e-6)
+
+
+def test_forces_vary_along_the_track_as_the_linear_theory_says():
+    """The variance over 16 tracks of 40 breaking stretches each, within three standard errors."""
+    tables = unit_tables(track=track(0.03, 0.3, "exponential"), initial="steady")
+    _, force = forces(tables, **{"run.engine": "me", "run.duration": 50.0, "run.realizations": 16})
+    squares = np.mean((force[:, 500:] - 0.505) ** 2, axis=1)
+    error = np.std(squares) / math.sqrt(len(squares) - 1)
+    assert error < 0.2 * 0.0261**2
+    assert np.mean(squares) == pytest.approx(0.0261**2, abs=3 * error)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        {"contacts.coupling": "scaled"},
+        # Many contacts are too weak for the back force at some places.
+        {"contacts.back_force_ratio": 0.6},
+        {"contacts.newborn_width": 0.2, "contacts.back_force_ratio": 0.3},
+        {"contacts.ageing": {"law": "log", "time": 0.3, "growth": 0.1}},
+        {
+            "contacts.back_force_ratio": 0.4,
+            "contacts.ageing": {
+                **{"law": "relax", "time": 0.3, "young_force_ratio": 0.7},
+                "young_relative_width": 0.3,
+            },
+        },
+        {"contacts.initial": "steady", "contacts.back_force_ratio": 0.2},
+    ],
+    ids=["equal", "scaled", "weak places", "newborn width", "log", "relax", "steady"],
+)
+def test_both_engines_feel_the_same_track(changes):
+    count = 20_000
+    tables = unit_tables(
+        count=count,
+        track=track(0.3, 0.6),
+        threshold={"law": "gaussian", "relative_width": 0.2},
+    )
+    each, all_ = (
+        forces(tables, **{"run.engine": engine, "run.duration": 6.0, **changes})[1][0]
+        for engine in ("eq", "me")
+    )
+    assert np.std(all_[150:]) > 0.05
+    assert np.max(np.abs(each - all_)) < 4.5 * 0.35 / math.sqrt(count)
+
+
+@pytest.mark.parametrize("engine", ["eq", "me"])
+def test_the_slider_meets_the_same_strength_in_each_stroke(engine):
+    """Forces of later strokes repeat, and differ from those of another realization."""
+    tables = unit_tables(
+        track=track(0.3, 1.0), threshold={"law": "gaussian", "relative_width": 0.2}
+    )
+    tables["drive"] = {"cycle": {"amplitude": 6.0, "velocity": 1.0, "cycles": 3}}
+    tables["run"] = {"engine": engine, "seed": 3, "realizations": 2}
+    _, force = forces(tables, **{"contacts.count": 20_000})
+    # The end of the stroke back, in each cycle of 24 s.
+    second, third = (force[:, 50 * end - 300 : 50 * end] for end in (42, 66))
+    noise = 8 * 0.35 / math.sqrt(20_000) if engine == "eq" else 2e-3
+    assert np.max(np.abs(third - second)) < noise
+    assert np.max(np.abs(second[0] - second[1])) > 0.07
+
+
+def test_wrong_tracks_are_refused(klein):
+    wrong = [
+        ({"spread": 0.0, "length": 1e-8}, {}, ["contacts.track.spread", "greater than 0"]),
+        ({"spread": 1.5, "length": 1e-8}, {}, ["contacts.track.spread", "less than or equal to 1"]),
+        ({"spread": 0.2, "length": 1e-10}, {}, ["contacts.track.length", "at least 900 pm"]),
+        ({"spread": 0.2}, {}, ["contacts.track.length", "missing"]),
+        (
+            {"spread": 0.2, "length": 1e-8, "correlation": "white"},
+            {},
+            ["contacts.track.correlation", "gaussian", "exponential"],
+        ),
+        (
+            {"spread": 0.2, "length": 1e-8},
+            {
+                "run__engine": "me",
+                "contacts__coupling": "equal",
+                "contacts__thermal": {"rate": 1e4, "force_ratio": 0.05},
+            },
+            ["contacts.track", "one strength", 'run.engine = "eq"'],
+        ),
+    ]
+    for table, changes, words in wrong:
+        with pytest.raises(ConfigError) as raised:
+            klein(contacts__track=table, **changes)
+        assert all(word in str(raised.value) for word in words), str(raised.value)
+
+
+def test_a_track_that_is_cut_off_is_reported(klein):
+    assert klein(contacts__track={"spread": 0.2, "length": 1e-8}).contacts.weak_track is None
+    message = klein(contacts__track={"spread": 0.5, "length": 1e-8}).contacts.weak_track
+    # The floor is f_b over a strong threshold: P(1 + 0.5 g < 0.1/1.023) = 0.0358
+    assert "on 3.6 % of the track" in message
+    assert "0.0977 of its mean" in message

@@ -165,10 +165,10 @@ contains
 
       stretch = pose%displacement - self%record(row_origin, contact)
       ! To the last digit as in a schedule.
-      if (.not. (allocated(self%births%force) .or. self%parameters%keeps_thresholds)) &
-         & stretch = pose%direction &
-         & * self%parameters%back_force_ratio * self%parameters%static_force &
-         & / self%record(row_stiffness, contact)
+      if (.not. (allocated(self%births%force) .or. self%parameters%keeps_thresholds)) then
+         stretch = pose%direction * self%parameters%back_force_ratio &
+            & * self%parameters%static_force / self%record(row_stiffness, contact)
+      end if
       self%life(life_clock, contact) = merge(1.0_wp, 2.0_wp, self%direction > 0.0_wp)
       self%life(life_key, contact) = self%breaking_stretch(self%record(row_limit, contact), &
          & self%direction * stretch, self%life(life_left, contact))
@@ -253,10 +253,11 @@ contains
             self%record(row_limit, contact) = self%next(next_limit, contact)
             key = self%next(next_key, contact)
             ! As for a contact that attaches outside a schedule, whose force is not known before.
-            if (allocated(self%births%force) .or. self%parameters%keeps_thresholds) &
-               & key = self%breaking_stretch(self%next(next_limit, &
-               & contact), self%direction * (schedule%attach_displacement(event) &
-               & - self%record(row_origin, contact)), self%life(life_next, contact))
+            if (allocated(self%births%force) .or. self%parameters%keeps_thresholds) then
+               key = self%breaking_stretch(self%next(next_limit, contact), self%direction &
+                  & * (schedule%attach_displacement(event) - self%record(row_origin, contact)), &
+                  & self%life(life_next, contact))
+            end if
             self%life(:, contact) = [merge(1.0_wp, 2.0_wp, self%direction > 0.0_wp), 0.0_wp, &
                & key, 0.0_wp]
             call self%insert(contact)

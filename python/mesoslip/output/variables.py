@@ -345,6 +345,14 @@ STEADY = Group(
     ),
 )
 
+TRACK_RESPONSE = Group(
+    wavenumber=Meaning("m-1", "wavenumber of the strength along the track"),
+    response=Meaning("N", "modulus of the response of the force to the relative strength"),
+    phase=Meaning("rad", "phase of that response"),
+    strength_spectrum=Meaning("m", "spectral density of the strength along the track over w^2"),
+    force_spectrum=Meaning("N2 m", "spectral density of the force along the track"),
+)
+
 CYCLE_TRACE = Group(
     time=Meaning("s", "time since the first passage of the section"),
     **TRACE.subset(

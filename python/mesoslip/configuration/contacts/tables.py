@@ -458,9 +458,9 @@ class Contacts(Table):
         if self.track is not None and self.track.length < MIN_LENGTH_RATIO * self.break_stretch:
             raise problem(
                 "track.length",
-                f"must be at least {with_unit(MIN_LENGTH_RATIO * self.break_stretch, 'm')}, a tenth "
-                "of the breaking stretch F_s/(N k): contacts that are pinned at one time attached "
-                "along a breaking stretch, so that shorter variations of the strength average out",
+                f"must be at least {with_unit(MIN_LENGTH_RATIO * self.break_stretch, 'm')}, a "
+                "tenth of the breaking stretch F_s/(N k): contacts that are pinned at one time "
+                "attached along a breaking stretch, over which shorter variations average out",
             )
         return self
 
@@ -483,8 +483,8 @@ class Contacts(Table):
         if share < MIN_CUT_SHARE:
             return None
         return (
-            f"contacts.track.spread = {self.track.spread:g}: on {100 * share:.2g} % of the track the "
-            f"strength is cut off at {floor:.3g} of its mean"
+            f"contacts.track.spread = {self.track.spread:g}: on {100 * share:.2g} % of the track "
+            f"the strength is cut off at {floor:.3g} of its mean"
         )
 
     @property

@@ -12,6 +12,7 @@ from mesoslip.theory.contacts.base import KNOWN_KEYS, ContactTheory
 from mesoslip.theory.contacts.lattice import LatticeTheory
 from mesoslip.theory.contacts.plain import PlainTheory
 from mesoslip.theory.contacts.thermal import ThermalAgeingTheory, ThermalTheory
+from mesoslip.theory.contacts.track import TrackTheory
 
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
@@ -22,6 +23,7 @@ THEORIES: tuple[type[ContactTheory], ...] = (
     PlainTheory,
     ThermalAgeingTheory,
     ThermalTheory,
+    TrackTheory,
 )
 
 

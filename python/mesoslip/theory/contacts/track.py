@@ -1,0 +1,42 @@
+"""Theory of contacts whose strength varies along the track: that of its mean, and linear in w."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, ClassVar
+
+from mesoslip.errors import ConfigError
+from mesoslip.theory.contacts.base import ContactTheory
+from mesoslip.theory.contacts.plain import PlainTheory
+from mesoslip.theory.quantity import Quantity
+
+if TYPE_CHECKING:
+    from mesoslip.theory.linear_stability import LinearStability
+
+
+class TrackTheory(PlainTheory):
+    """Plain contacts on a track (model section 18)."""
+
+    features: ClassVar[frozenset[str]] = frozenset({"contacts.track"})
+    caveat: ClassVar[str] = "computed for the mean strength of contacts.track"
+
+    def sliding(self, velocity: float | None = None) -> LinearStability:
+        return ContactTheory.sliding(self, velocity)
+
+    def quantities(self) -> Iterator[Quantity]:
+        from mesoslip.theory.track_response import TrackResponse
+
+        yield from super().quantities()
+        try:
+            deviation = TrackResponse(self.config).force_deviation
+        except ConfigError:
+            return
+        if math.isfinite(deviation):
+            yield Quantity(
+                "track_force_deviation",
+                deviation,
+                "N",
+                "standard deviation of the force of slow sliding along the track, linear in its "
+                "spread",
+            )

@@ -48,6 +48,12 @@ def trace(
     decimal: Annotated[
         str | None, typer.Option(help="Decimal sign, if the file allows two", metavar="','")
     ] = None,
+    sheet: Annotated[
+        str | None,
+        typer.Option(
+            help="Sheet of a workbook; that with the most numbers by default", metavar="NAME"
+        ),
+    ] = None,
     rate: Annotated[str | None, _option("Sampling rate, if the file has no times", "1 kHz")] = None,
     velocity: Annotated[
         str | None, _option("Velocity of the drive, if no load point was recorded", "42 um/s")
@@ -109,6 +115,7 @@ def trace(
             config=config,
             headers=columns,
             decimal=decimal,
+            sheet=sheet,
             rate=rate,
             velocity=velocity,
             stiffness=stiffness,

@@ -149,6 +149,8 @@ class TraceDescription(Table):
     """Headers instead of those of the file, such as "time [s], force [uN], -"."""
     decimal: Literal[".", ","] | None = None
     """Decimal sign; by default found from the numbers, if they allow one only."""
+    sheet: Text | None = None
+    """Sheet of a workbook (.xlsx); by default the one with the most numbers."""
     rate: Rate | None = None
     """Sampling rate, for a file without times."""
     part: Annotated[Whole, Field(ge=1)] | None = None

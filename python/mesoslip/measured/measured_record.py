@@ -77,6 +77,7 @@ def read_record(path: Path, trace: TraceDescription) -> Record:
     table = read_file(
         path,
         decimal=trace.decimal,
+        sheet=trace.sheet,
         has_headers=trace.headers is not None or bool(trace.columns.model_fields_set),
     )
     columns = assign(table, trace.columns, trace.headers)

@@ -160,6 +160,7 @@ def read_trace(
     *,
     columns: str | None = None,
     decimal: str | None = None,
+    sheet: str | None = None,
     rate: str | float | None = None,
     velocity: str | float | None = None,
     stiffness: str | float | None = None,
@@ -189,6 +190,8 @@ def read_trace(
         Headers instead of those of the file, such as "time [s], force [uN], -".
     decimal
         Decimal sign, "." or ",", if the file allows both.
+    sheet
+        Sheet of a workbook (.xlsx); by default the one with the most numbers.
     rate
         Sampling rate [1/s], for a file without times.
     velocity
@@ -239,6 +242,7 @@ def read_trace(
             config=config,
             headers=columns,
             decimal=decimal,
+            sheet=sheet,
             rate=rate,
             velocity=velocity,
             stiffness=stiffness,

@@ -69,7 +69,7 @@ class Found(NamedTuple):
 Reader = Callable[[bytes], AbstractContextManager[Sequence[Found]]]
 
 
-def _read(kind: str, path: Path, data: bytes, arrays: Reader) -> Table:
+def read_arrays(kind: str, path: Path, data: bytes, arrays: Reader) -> Table:
     """Read the arrays of a file as columns of a table."""
     try:
         with LOCK, arrays(data) as found:
@@ -337,7 +337,7 @@ def _netcdf3(data: bytes) -> Iterator[list[Found]]:
 
 
 def _reader(kind: str, arrays: Reader) -> Callable[[Path, bytes], Table]:
-    return lambda path, data: _read(kind, path, data, arrays)
+    return lambda path, data: read_arrays(kind, path, data, arrays)
 
 
 # Readers by the first bytes of a file.

@@ -22,6 +22,9 @@ HEAD = 4096
 # Maximum share of null characters in a damaged text.
 MAX_NULLS = 0.01
 
+# Members of a zip archive that is one file: arrays of NumPy, a workbook.
+PACKED = (".npy", "xl/workbook.xml")
+
 NEWLINE = b"\n"
 # Line breaks and minus signs, and what stands for them.
 PLAIN = ((b"\r\n", NEWLINE), (b"\r", NEWLINE), ("\N{MINUS SIGN}".encode(), b"-"))
@@ -60,7 +63,7 @@ def _decompressed(path: Path, data: bytes) -> bytes:
         if is_zip:
             with zipfile.ZipFile(BytesIO(data)) as archive:
                 files = [one for one in archive.infolist() if not one.is_dir()]
-                if any(one.filename.endswith(".npy") for one in files):
+                if any(one.filename.endswith(PACKED) for one in files):
                     return data
                 if len(files) != 1:
                     raise FileError(
@@ -109,8 +112,8 @@ def text_of(path: Path, data: bytes) -> bytes:
         raise FileError(f"{path}: line {text.count(NEWLINE, 0, at) + 1}: has a null character")
     if text is None or b"\0" in text:
         raise FileError(
-            f"{path}: is neither text nor MATLAB, HDF5, netCDF or .npz: it begins with "
-            f"{shown(data[:12])}"
+            f"{path}: is neither text nor .xlsx, .tdms, MATLAB, HDF5, netCDF or .npz: it begins "
+            f"with {shown(data[:12])}"
         )
     for old, new in PLAIN:
         if old in text:

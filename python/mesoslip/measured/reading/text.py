@@ -11,6 +11,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from io import BytesIO
+from itertools import islice
 from pathlib import Path
 from typing import overload
 
@@ -18,7 +19,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip.errors import FileError, shown
-from mesoslip.measured.reading.cells import COMMENT, hint_for, is_missing, is_number, split
+from mesoslip.measured.reading.cells import (
+    COMMENT,
+    Clock,
+    hint_for,
+    is_missing,
+    is_number,
+    split,
+)
 from mesoslip.measured.reading.layout import Layout, check_decimal_comma, find_layout, header_cells
 from mesoslip.measured.reading.table import Array, BadCell, Table, listed
 
@@ -79,11 +87,13 @@ def read_text(
         check_decimal_comma(path, lines, layout)
     body = _Body(path, lines, layout, is_ended=text.endswith(b"\n"))
     values, numbers = body.read()
-    units = layout.units or ()
+    units = list(layout.units or ("",) * layout.count)
+    for column in body.clocks:
+        units[column] = "s"
     return Table(
         path,
         layout.headers or ("",) * layout.count,
-        tuple(units) or ("",) * layout.count,
+        tuple(units),
         values,
         numbers,
         body.bad,
@@ -118,12 +128,15 @@ class _Body:
     odd: list[int] = field(default_factory=list)
     cut: int | None = None
     above: set[str] = field(default_factory=set)
+    clocks: dict[int, Clock] = field(default_factory=dict)
+    """Columns of time stamps."""
 
     def read(self) -> tuple[Array, Numbers]:
         """Numbers, shape (columns, rows), and the line of each row."""
         layout = self.layout
         # Lines above the numbers may be repeated.
         self.above = {line.strip() for line in self.lines[: layout.first]}
+        self.clocks = self._find_clocks()
         count = len(self.lines) - layout.first
         values = np.full((layout.count, count), np.nan)
         is_row = np.zeros(count, dtype=bool)
@@ -142,6 +155,24 @@ class _Body:
         if kept.size and kept[-1] == kept.size - 1:
             return values[:, : kept.size], kept + layout.first + 1
         return values[:, kept], kept + layout.first + 1
+
+    def _find_clocks(self) -> dict[int, Clock]:
+        """Columns of time stamps, by the first row."""
+        layout = self.layout
+        for line in islice(self.lines, layout.first, None):
+            if not line.strip() or COMMENT.match(line) or self._is_header(line):
+                continue
+            try:
+                cells = split(line, layout.delimiter)[: layout.count]
+            except ValueError:
+                break
+            if any(is_number(cell, layout.decimal) for cell in cells):
+                return {
+                    column: Clock()
+                    for column, cell in enumerate(cells)
+                    if Clock().seconds(cell) is not None
+                }
+        return {}
 
     def _read_block(
         self, block: slice, values: Array, is_row: NDArray[np.bool], signs: NDArray[np.uint16]
@@ -168,6 +199,8 @@ class _Body:
     def _regular(self, data: NDArray[np.uint8], starts: Numbers, ends: Numbers) -> NDArray[np.bool]:
         """Whether lines have the usual number of cells and only characters of numbers."""
         layout = self.layout
+        if self.clocks:
+            return np.zeros(len(starts), dtype=bool)
         allowed = np.zeros(256, dtype=bool)
         comma = layout.decimal if layout.delimiter != "," or layout.decimal != "," else "."
         allowed[list(b"0123456789+-eE \n" + (comma + layout.delimiter).encode())] = True
@@ -277,7 +310,11 @@ class _Body:
     def _number(self, line: int, column: int, cell: str) -> float:
         """The number of a cell; NaN without one."""
         decimal = self.layout.decimal
-        if is_number(cell, decimal):
+        clock = self.clocks.get(column)
+        seconds = None if clock is None else clock.seconds(cell)
+        if seconds is not None:
+            return seconds
+        if clock is None and is_number(cell, decimal):
             value = float(cell.replace(",", "."))
             if math.isfinite(value):
                 return value
@@ -343,6 +380,8 @@ class _Body:
             for lines, what in found
             if lines
         ]
+        for column, clock in self.clocks.items():
+            notes.append(f"column {column + 1}: time stamps, as seconds from {clock.first}")
         for number in self.texts[:3]:
             notes.append(f"line {number}: text, left out: {shown(self.lines[number - 1].strip())}")
         if len(self.texts) > 3:

@@ -5,15 +5,19 @@ from __future__ import annotations
 import math
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mesoslip.command_line.options import SavedOption, counted
-from mesoslip.command_line.progress import steps_shown
+from mesoslip.command_line.options import SavedOption, counted, workers_option
+from mesoslip.command_line.progress import progress_shown, say, steps_shown
+from mesoslip.errors import ConfigError, Problem
 
 if TYPE_CHECKING:
     import xarray as xr
+
+# Maximum number of files whose errors are printed.
+MAX_REPORTED = 5
 
 
 def _option(help_text: str, example: str, name: str | None = None) -> typer.models.OptionInfo:
@@ -23,10 +27,12 @@ def _option(help_text: str, example: str, name: str | None = None) -> typer.mode
 
 
 def trace(
-    file: Annotated[
-        Path,
+    files: Annotated[
+        list[Path],
         typer.Argument(
-            help="File of the measurement, or an EXPERIMENT.toml that names it", metavar="FILE"
+            help="File of the measurement, or an EXPERIMENT.toml that names it; several files are "
+            "parts of one test",
+            metavar="FILE...",
         ),
     ],
     output: SavedOption = None,
@@ -92,6 +98,16 @@ def trace(
             metavar="NUMBER",
         ),
     ] = None,
+    batch: Annotated[
+        Path | None,
+        typer.Option(
+            "--batch",
+            help="Read each file by itself, into a folder (-o; out by default), and write a table "
+            "with a row for each; an EXPERIMENT.toml before the files describes all",
+            metavar="TABLE.csv",
+        ),
+    ] = None,
+    workers: Annotated[int | None, workers_option("files with --batch")] = None,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Print what is understood, and write nothing")
     ] = False,
@@ -100,44 +116,46 @@ def trace(
     ] = False,
 ) -> None:
     """Read a measured trace as the laboratory wrote it, and write an output like that of a run."""
+    from mesoslip.measured.batch import output_name
     from mesoslip.measured.trace import trace_of, understand
     from mesoslip.output import targets, writing
 
-    is_packed = file.suffix in {".gz", ".bz2", ".xz", ".zip"}
-    path = output or Path("out") / f"{Path(file.stem).stem if is_packed else file.stem}.nc"
+    options: dict[str, Any] = {
+        "config": config,
+        "headers": columns,
+        "decimal": decimal,
+        "sheet": sheet,
+        "rate": rate,
+        "velocity": velocity,
+        "stiffness": stiffness,
+        "normal_force": normal_force,
+        "normal_stress": normal_stress,
+        "area": area,
+        "start": start,
+        "end": end,
+        "hum": hum,
+        "trend": trend,
+        "noise": noise,
+        "period": period,
+        "part": part,
+        "min_fall": min_fall,
+    }
+    if batch is not None:
+        raise typer.Exit(_read_each(files, output or Path("out"), batch, options, workers, dry_run))
+    path = output or Path("out") / output_name(files[0])
     if not dry_run:
-        targets.check_output(path, [file, *([] if config is None else [config])])
+        targets.check_output(path, [*files, *([] if config is None else [config])])
     began = time.monotonic()
     with steps_shown(began) as step:
         step("reading")
-        understood = understand(
-            file,
-            config=config,
-            headers=columns,
-            decimal=decimal,
-            sheet=sheet,
-            rate=rate,
-            velocity=velocity,
-            stiffness=stiffness,
-            normal_force=normal_force,
-            normal_stress=normal_stress,
-            area=area,
-            start=start,
-            end=end,
-            hum=hum,
-            trend=trend,
-            noise=noise,
-            period=period,
-            part=part,
-            min_fall=min_fall,
-        )
+        understood = understand(files, **options)
         step("estimating the noise")
         report = understood.report if verbose else understood.summary
     for line in report:
         typer.echo(line)
     if dry_run:
         return
-    targets.check_output(path, [understood.path])
+    targets.check_output(path, understood.paths)
     with steps_shown(began) as step:
         step("looking for slips")
         tree = trace_of(understood)
@@ -146,6 +164,37 @@ def trace(
     typer.echo(f"{path}: {', '.join(_summary(tree))}", err=True)
     if tree.attrs.get("comment"):
         typer.echo(f"{path}: {tree.attrs['comment']}", err=True)
+
+
+def _read_each(
+    files: list[Path],
+    folder: Path,
+    table: Path,
+    options: dict[str, Any],
+    workers: int | None,
+    dry_run: bool,
+) -> int:
+    """Read files with one description, and write their table; returns the exit status."""
+    from mesoslip.execution.stop import stopped_by_signals
+    from mesoslip.measured import batch
+    from mesoslip.output import table_files, targets
+
+    if dry_run:
+        raise ConfigError([Problem("", "--dry-run", "prints one file; leave out --batch")])
+    description, measurements = batch.described(files)
+    pieces = batch.pieces_of(measurements, folder, description, options)
+    targets.check_writable(table, files)
+    with stopped_by_signals() as stop, progress_shown(False, "reading") as progress:
+        rows = batch.read_pieces(pieces, stop, executor=workers, progress=progress)
+    table_files.write_table(rows, batch.COLUMNS, table)
+    failed = [one for one in rows if one.get("message")]
+    for row in failed[:MAX_REPORTED]:
+        say(row["message"])
+    if len(failed) > MAX_REPORTED:
+        say(f"{len(failed) - MAX_REPORTED} more could not be read: see the column message")
+    missing = f", {len(pieces) - len(rows)} not read: stopped" if len(rows) < len(pieces) else ""
+    say(f"{table}: {counted(len(rows) - len(failed), 'file')} read, {len(failed)} failed{missing}")
+    return int(stop.exit_status if stop.is_set() else bool(failed))
 
 
 def _summary(tree: xr.DataTree) -> list[str]:

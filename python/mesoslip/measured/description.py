@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
@@ -141,8 +141,9 @@ class TraceDescription(Table):
     Quantities are strings with units, as they were written; `si` has them in SI.
     """
 
-    file: Text
-    """The file of the measurement, relative to the file of this table."""
+    file: Text | Annotated[list[Text], Field(min_length=1)]
+    """The file of the measurement, relative to the file of this table; or a list of the parts of a
+    test, in their order."""
     columns: Columns = Columns()
     """Columns of the file by what they hold; by default found from its header."""
     headers: Text | None = None
@@ -243,28 +244,38 @@ class Experiment(Table):
 OTHER_TABLES = ("fit", "trace")
 
 
-def describe(file: Path, options: Mapping[str, Any]) -> tuple[Experiment, Path, Config | None]:
-    """The description of a measurement, its path, and the configuration of a model, if any.
+def describe(
+    files: Sequence[Path], options: Mapping[str, Any]
+) -> tuple[Experiment, list[Path], Config | None]:
+    """The description of a measurement, its files, and the configuration of a model, if any.
 
-    The file is that of the measurement, or a TOML file with a table [trace], whose keys the options
-    replace.
+    The files are those of the parts of the measurement, or a TOML file with a table [trace], whose
+    keys the options replace.
     """
+    file = files[0]
     changes = {name: value for name, value in options.items() if value is not None}
-    if file.suffix.lower() != ".toml":
-        tables = {"trace": {"file": file.name, **changes}}
+    toml = next((one for one in files if one.suffix.lower() == ".toml"), None)
+    if toml is None:
+        names = [one.name for one in files]
+        tables = {"trace": {"file": names if len(files) > 1 else names[0], **changes}}
         try:
-            return _checked(tables, ""), file, None
+            return _checked(tables, ""), list(files), None
         except ConfigError as error:
             raise ConfigError(
                 [replace(one, key=option_name(one.key)) for one in error.problems]
             ) from None
+    if len(files) > 1:
+        message = "is a description, and describes its own files; give it alone, or --batch"
+        raise ConfigError([Problem(str(toml), "", message)])
     tables = read_toml(file).tables
     table = tables.get("trace")
     if not isinstance(table, Mapping):
         message = "missing; it names the file of the measurement" if table is None else "no table"
         raise ConfigError([Problem(str(file), "trace", message)])
     experiment = _checked({"title": tables.get("title"), "trace": {**table, **changes}}, str(file))
-    return experiment, file.parent / experiment.trace.file, model_of(tables, str(file))
+    parts = experiment.trace.file
+    paths = [file.parent / one for one in ([parts] if isinstance(parts, str) else parts)]
+    return experiment, paths, model_of(tables, str(file))
 
 
 def option_name(key: str) -> str:

@@ -13,6 +13,7 @@ from mesoslip.errors import FileError, shown
 from mesoslip.measured.columns import FORCES, Assignment, Used, assign, sentinels, values_of
 from mesoslip.measured.description import Column, TraceDescription
 from mesoslip.measured.headers import QUANTITIES, name_of
+from mesoslip.measured.parts import continued, joined
 from mesoslip.measured.reading.file import read_file
 from mesoslip.measured.reading.table import Array, Table, listed
 from mesoslip.measured.sampling import in_order, sampling_report, sampling_summary
@@ -72,14 +73,19 @@ class Record:
         return "friction_coefficient" if self.is_friction else "spring_force"
 
 
-def read_record(path: Path, trace: TraceDescription) -> Record:
-    """Read the file of a measurement; ``trace`` has the properties that it does not contain."""
-    table = read_file(
-        path,
-        decimal=trace.decimal,
-        sheet=trace.sheet,
-        has_headers=trace.headers is not None or bool(trace.columns.model_fields_set),
-    )
+def read_record(paths: Sequence[Path], trace: TraceDescription) -> Record:
+    """Read the files of a measurement; ``trace`` has the properties that they do not contain."""
+    path = paths[0]
+    tables = [
+        read_file(
+            one,
+            decimal=trace.decimal,
+            sheet=trace.sheet,
+            has_headers=trace.headers is not None or bool(trace.columns.model_fields_set),
+        )
+        for one in paths
+    ]
+    table = joined(tables)
     columns = assign(table, trace.columns, trace.headers)
     _check_needed(table, columns, trace)
     values, notes = {}, []
@@ -96,7 +102,11 @@ def read_record(path: Path, trace: TraceDescription) -> Record:
         raise FileError(f"{path}: {error}; the other columns are {names}") from None
     force = made.values
     rate = trace.si("rate")
-    time = values["time"] if rate is None else np.arange(len(table.lines)) / rate
+    if rate is None:
+        time, moved = continued(values["time"], tables)
+        notes += moved
+    else:
+        time = np.arange(len(table.lines)) / rate
     _check_span(time, trace)
     inside = _inside(time, trace)
     whole = np.isfinite(time) & np.isfinite(force)

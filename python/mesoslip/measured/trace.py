@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -78,7 +78,7 @@ class Understood:
     """Configuration of a model."""
     stiffness: float | None
     """Spring constant, in the unit of the force over metre."""
-    path: Path
+    paths: list[Path]
 
     @cached_property
     def noise(self) -> TraceNoise | float:
@@ -109,10 +109,17 @@ class Understood:
 
 
 def understand(
-    file: PathLike, *, config: ConfigLike | None = None, **options: str | float | None
+    file: PathLike | Sequence[PathLike],
+    /,
+    *,
+    config: ConfigLike | None = None,
+    **options: str | float | None,
 ) -> Understood:
     """Read the file of a measurement, with keys of the table [trace]; see `read_trace`."""
-    experiment, path, beside = describe(as_path(file), options)
+    files = [file] if isinstance(file, str | Path) or not isinstance(file, Sequence) else file
+    if not files:
+        raise ConfigError([Problem("", "file", "expected at least one file of a measurement", [])])
+    experiment, paths, beside = describe([as_path(one) for one in files], options)
     model = beside if config is None else config_of_file(config)
     trace = experiment.trace
     if model is not None:
@@ -120,11 +127,11 @@ def understand(
         if given:
             message = "is given in the configuration; change it there"
             raise ConfigError([Problem("", option_name(name), message) for name in given])
-    record = read_record(path, trace)
+    record = read_record(paths, trace)
     stiffness = _stiffness(record, trace) if model is None else model.spring_stiffness
     _check_units(record, trace, model)
     resolved = experiment.model_copy(update={"trace": resolve(trace, record)})
-    return Understood(record, resolved, model, stiffness, path)
+    return Understood(record, resolved, model, stiffness, paths)
 
 
 def _stiffness(record: Record, trace: TraceDescription) -> float | None:
@@ -156,7 +163,7 @@ def _check_units(record: Record, trace: TraceDescription, model: Config | None) 
 
 
 def read_trace(
-    file: PathLike,
+    file: PathLike | Sequence[PathLike],
     *,
     columns: str | None = None,
     decimal: str | None = None,
@@ -185,7 +192,8 @@ def read_trace(
     Parameters
     ----------
     file
-        The file of the measurement, or a TOML file with a table [trace] that names it.
+        The file of the measurement, or a TOML file with a table [trace] that names it. Several
+        files are parts of one test, in their order; they have the same columns.
     columns
         Headers instead of those of the file, such as "time [s], force [uN], -".
     decimal
@@ -264,7 +272,8 @@ def read_trace(
 def trace_of(understood: Understood) -> xr.DataTree:
     """The output of the interpretation of a file; see `read_trace`."""
     record, trace = understood.record, understood.experiment.trace
-    title = understood.experiment.title or f"Measured: {understood.path.name}"
+    measured_file = ", ".join(one.name for one in understood.paths)
+    title = understood.experiment.title or f"Measured: {measured_file}"
     velocity, stiffness = trace.si("velocity"), understood.stiffness
     period = trace.si("period")
     known: Config | PartialConfig = PartialConfig(title, velocity, stiffness)
@@ -308,7 +317,7 @@ def trace_of(understood: Understood) -> xr.DataTree:
     comment = "; ".join(comments)
     details = {
         "origin": "measured",
-        "measured_file": understood.path.name,
+        "measured_file": measured_file,
         "trace": understood.experiment.trace.to_toml(),
         "understood": "\n".join(understood.report),
         "complete": "true",

@@ -114,7 +114,9 @@ ROOT = Group(
     slip_time_error=Meaning(
         "s", "estimated error of the time at which a slip starts, maximum over all slips"
     ),
-    energy_residual=Meaning("1", "residual of the energy balance over the work of the drive, to and fro"),
+    energy_residual=Meaning(
+        "1", "residual of the energy balance over the work of the drive, to and fro"
+    ),
     kernel_seconds=Meaning("s", "computing time of the kernel"),
     avalanche_count=Meaning("1", "number of avalanches in the run", np.int64),
     avalanche_slip=Meaning(

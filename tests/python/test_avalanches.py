@@ -260,6 +260,7 @@ def test_stick_slip_by_interaction(klein):
 
 
 @pytest.mark.usefixtures("few_replicas")
+@pytest.mark.usefixtures("few_replicas", "quick_pictures")
 def test_commands(tmp_path, capsys, monkeypatch):
     from mesoslip.command_line import main as cli
 

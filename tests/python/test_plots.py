@@ -18,6 +18,7 @@ from mesoslip.output.kinds import KINDS as OUTPUTS
 from mesoslip.output.writing import write
 from mesoslip.plots import lines
 from mesoslip.plots.extent import MAX_PARTS, Extent
+from mesoslip.plots.logarithmic import logarithmic
 from mesoslip.plots.style import curve_style, styled
 from mesoslip.plots.views import VIEWS, names_of_views
 from mesoslip.plots.views.layers import layer_motion
@@ -278,6 +279,16 @@ def overlapping(figure):
 def test_nothing_covers_anything_else(runs, name, x):
     """Whatever the run, no panel, label or legend reaches into another one or out of the figure."""
     assert overlapping(mesoslip.plot(runs[name], x=x)) == []
+
+
+@pytest.mark.parametrize("limits", [(102.5, 109.9), (1.02, 1.09), (1.3, 9.0), (0.5, 30.0)])
+def test_logarithmic_axes_have_labels_over_any_range(limits):
+    """Over a few per cent too, where no multiple of a power of ten lies."""
+    axes = Figure().subplots()
+    logarithmic(axes, "x")
+    axes.set_xlim(*limits)
+    places = np.asarray(axes.get_xticks())
+    assert np.count_nonzero((places >= limits[0]) & (places <= limits[1])) >= 3
 
 
 def test_a_title_is_no_formula(runs):

@@ -104,6 +104,7 @@ def test_a_report_of_kleins_run(klein_run, tmp_path):
     assert again == text
 
 
+@pytest.mark.usefixtures("quick_pictures")
 @pytest.mark.parametrize("kind", [kind if kind in DIFFERENT else long(kind) for kind in KINDS])
 def test_there_is_a_report_of_every_kind(kind, tmp_path):
     config = configuration(kind)
@@ -147,6 +148,7 @@ def test_a_report_has_what_is_read_off_a_drive_with_stages(klein, tmp_path):
     assert "Response to the drive" not in page.words
 
 
+@pytest.mark.usefixtures("quick_pictures")
 def test_reports_of_the_theory(klein, tmp_path):
     curve = mesoslip.curve(klein())
     _, page = written([curve, mesoslip.curve(klein(slider__stiffness=1e6))], tmp_path / "a.html")

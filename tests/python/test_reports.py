@@ -18,7 +18,7 @@ from mesoslip.quantities import column
 from mesoslip.reports.method_paragraphs import cycle_method
 from mesoslip.reports.sections import SECTIONS
 
-pytestmark = pytest.mark.usefixtures("few_replicas")
+pytestmark = pytest.mark.usefixtures("few_replicas", "quick_pictures")
 
 MOST_BYTES = 3_000_000
 # Elements of HTML that have no end.
@@ -104,7 +104,6 @@ def test_a_report_of_kleins_run(klein_run, tmp_path):
     assert again == text
 
 
-@pytest.mark.usefixtures("quick_pictures")
 @pytest.mark.parametrize("kind", [kind if kind in DIFFERENT else long(kind) for kind in KINDS])
 def test_there_is_a_report_of_every_kind(kind, tmp_path):
     config = configuration(kind)
@@ -148,7 +147,6 @@ def test_a_report_has_what_is_read_off_a_drive_with_stages(klein, tmp_path):
     assert "Response to the drive" not in page.words
 
 
-@pytest.mark.usefixtures("quick_pictures")
 def test_reports_of_the_theory(klein, tmp_path):
     curve = mesoslip.curve(klein())
     _, page = written([curve, mesoslip.curve(klein(slider__stiffness=1e6))], tmp_path / "a.html")

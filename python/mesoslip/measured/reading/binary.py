@@ -23,6 +23,14 @@ MAX_DEPTH = 20
 MAX_COLUMNS = 200
 
 
+class Reader(NamedTuple):
+    """A format: its name, the first bytes of its files, and a function that yields their arrays."""
+
+    kind: str
+    start: bytes
+    arrays: Callable[[bytes], Iterator[Found]]
+
+
 class Found(NamedTuple):
     """An array of a file: its name with those of its groups, its unit, and a longer name."""
 
@@ -32,17 +40,17 @@ class Found(NamedTuple):
     long_name: str = ""
 
 
-def _read(kind: str, path: Path, data: bytes, arrays: Callable[[bytes], Iterator[Found]]) -> Table:
+def read_binary(reader: Reader, path: Path, data: bytes) -> Table:
     """Read the arrays of a file as columns of a table."""
     try:
         with LOCK:
-            found = list(arrays(data))
+            found = list(reader.arrays(data))
     except FileError as error:
         raise FileError(f"{path}: {error}") from None
     # Libraries raise errors of any type for a damaged file.
     except Exception as error:
-        raise FileError(f"{path}: a damaged file of {kind}: {error}") from None
-    return _table(kind, path, found)
+        raise FileError(f"{path}: a damaged file of {reader.kind}: {error}") from None
+    return _table(reader.kind, path, found)
 
 
 def _table(kind: str, path: Path, found: list[Found]) -> Table:
@@ -233,19 +241,12 @@ def _netcdf3(data: bytes) -> Iterator[Found]:
             yield _unpacked(name, np.array(variable.data), attributes)
 
 
-def _reader(
-    kind: str, arrays: Callable[[bytes], Iterator[Found]]
-) -> Callable[[Path, bytes], Table]:
-    return lambda path, data: _read(kind, path, data, arrays)
-
-
-# Readers by the first bytes of a file.
 READERS = (
-    (b"PK\x03\x04", _reader("NumPy (.npz)", _npz)),
-    (b"\x93NUMPY", _reader("NumPy (.npy)", _npy)),
-    (b"MATLAB 5.0", _reader("MATLAB", _matlab)),
-    (b"MATLAB 7.3", _reader("MATLAB 7.3 (HDF5)", _hdf5)),
-    (HDF5, _reader("HDF5 or netCDF-4", _hdf5)),
-    (b"CDF\x01", _reader("netCDF-3", _netcdf3)),
-    (b"CDF\x02", _reader("netCDF-3", _netcdf3)),
+    Reader("NumPy (.npz)", b"PK\x03\x04", _npz),
+    Reader("NumPy (.npy)", b"\x93NUMPY", _npy),
+    Reader("MATLAB", b"MATLAB 5.0", _matlab),
+    Reader("MATLAB 7.3 (HDF5)", b"MATLAB 7.3", _hdf5),
+    Reader("HDF5 or netCDF-4", HDF5, _hdf5),
+    Reader("netCDF-3", b"CDF\x01", _netcdf3),
+    Reader("netCDF-3", b"CDF\x02", _netcdf3),
 )

@@ -94,10 +94,10 @@ def _limited(path: Path, file: IO[bytes]) -> bytes:
     return data
 
 
-def text_of(path: Path, data: bytes) -> str:
+def text_of(path: Path, data: bytes, others: str) -> str:
     """The text of a file: UTF-8, UTF-16 or an encoding of Western Europe.
 
-    Line breaks are `\\n`, and minus signs hyphens.
+    Line breaks are `\\n`, and minus signs hyphens. ``others`` are the formats besides text.
     """
     text = _decoded(data)
     if text is not None and 0 < text.count("\0") < MAX_NULLS * len(text):
@@ -105,8 +105,7 @@ def text_of(path: Path, data: bytes) -> str:
         raise FileError(f"{path}: line {text.count(chr(10), 0, at) + 1}: has a null character")
     if text is None or "\0" in text:
         raise FileError(
-            f"{path}: is neither text nor MATLAB, HDF5, netCDF or .npz: it begins with "
-            f"{shown(data[:12])}"
+            f"{path}: is no text, and no file of {others}: it begins with {shown(data[:12])}"
         )
     text = text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
     return text.replace("\N{MINUS SIGN}", "-")

@@ -12,6 +12,7 @@ import os
 import shutil
 import subprocess
 import sys
+import sysconfig
 import time
 import tomllib
 from collections.abc import Iterator
@@ -95,16 +96,18 @@ def prepare_kernel() -> None:
         setup = run("meson", "setup", *options, KERNEL, SOURCE)
         if setup.returncode:
             raise SystemExit(setup.stdout + setup.stderr)
-    if not build_kernel():
+    if not build_kernel(programs=[]):
         raise SystemExit("mutants: the sources as they are do not compile")
 
 
-def build_kernel() -> bool:
-    """Build the kernels and put them into the copied package."""
-    if run("ninja", "-C", KERNEL).returncode:
+def build_kernel(programs: list[str]) -> bool:
+    """Build Fortran tests; without any, the kernels, and put them into the copied package."""
+    targets = [f"tests/fortran/test_{name}" for name in programs]
+    library = f"python/_core{sysconfig.get_config_var('EXT_SUFFIX')}"
+    if run("ninja", "-C", KERNEL, *(targets or [library])).returncode:
         return False
-    (library,) = (KERNEL / "python").glob("_core.*.so")
-    shutil.copyfile(library, PACKAGE / library.name)
+    if not targets:
+        shutil.copyfile(KERNEL / library, PACKAGE / Path(library).name)
     return True
 
 
@@ -142,10 +145,17 @@ def is_program(test: str) -> bool:
     return test.endswith(".f90")
 
 
+def programs_of(tests: tuple[str, ...]) -> list[str]:
+    """Names of the Fortran programs among tests."""
+    return [Path(test).stem.removeprefix("test_") for test in tests if is_program(test)]
+
+
 def passes(tests: tuple[str, ...]) -> bool:
     """Whether the tests pass with the copied package."""
-    programs = [Path(test).stem.removeprefix("test_") for test in tests if is_program(test)]
-    line = ("meson", "test", "-C", KERNEL, *programs) if programs else (*PYTEST, *tests)
+    programs = programs_of(tests)
+    line = ("meson", "test", "-C", KERNEL, "--no-rebuild", *programs)
+    if not programs:
+        line = (*PYTEST, *tests)
     try:
         done = run(*line, seconds=TEST_SECONDS)
     except subprocess.TimeoutExpired:
@@ -159,7 +169,7 @@ def outcome(mutant: Mutant) -> str:
     """Make a mutant, and see whether its tests pass."""
     if mutant.is_fortran:
         with changed(SOURCE / mutant.file, mutant):
-            if not build_kernel():
+            if not build_kernel(programs_of(mutant.tests)):
                 return NOT_BUILT
             return ALIVE if passes(mutant.tests) else KILLED
     with changed(PACKAGE / Path(mutant.file).relative_to("python/mesoslip"), mutant):

@@ -47,18 +47,29 @@ def run_of(kind, **changes):
 without_ageing = functools.lru_cache(1)(run_of)
 
 
+def may_age(kind):
+    """Whether contacts of a short run can also age without being others."""
+    config = configuration(kind)
+    features = set() if config.run.engine == "me" else {"contacts.thermal"}
+    is_formula = config.contacts.threshold.law != "table"
+    return config.contact_features.keys() <= features and (
+        is_formula and not config.contacts.newborn_width
+    )
+
+
+# Ways to attach, to end and to start: one law is enough for them.
+LIKE_OTHERS = ("realizations", "steady", "bundle", "delays", "to a", "bdf", "to a slip")
+
+
 @pytest.mark.parametrize(
-    "kind",
-    [
-        kind
+    ("law", "kind"),
+    [("relax", kind) for kind in KINDS if may_age(kind)]
+    + [
+        long("log", kind) if any(one in kind for one in LIKE_OTHERS) else ("log", kind)
         for kind in KINDS
-        if not any(
-            one in kind
-            for one in ("lattice", "ageing", "table", "stiffnesses", "newborn", "thermal, me")
-        )
+        if may_age(kind)
     ],
 )
-@pytest.mark.parametrize("law", ["relax", "log"])
 def test_young_like_old_is_without_ageing_to_the_bit(kind, law):
     same = {"law": "relax", "time": 1e-3, "young_force_ratio": 1.0, "young_relative_width": 0.1}
     if law == "log":

@@ -259,7 +259,7 @@ def test_stick_slip_by_interaction(klein):
     assert np.max(np.abs(after["contact_force"].values[inside])) < 0.01 * 18e-6
 
 
-@pytest.mark.usefixtures("few_replicas")
+@pytest.mark.usefixtures("few_replicas", "quick_pictures")
 def test_commands(tmp_path, capsys, monkeypatch):
     from mesoslip.command_line import main as cli
 

@@ -315,6 +315,7 @@ def test_ctrl_c_keeps_what_there_is(tmp_path):
     mesoslip.plot(tree, tmp_path / "partial.png")
 
 
+@pytest.mark.usefixtures("quick_pictures")
 def test_curve_reports_the_instability(short, tmp_path, command):
     output = tmp_path / "curve.nc"
     changes = ("--set", "curve.density_at=[3e-9]", "--set", "curve.drive_displacement=50 nm")

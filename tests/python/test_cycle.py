@@ -309,6 +309,7 @@ def test_another_slider_keeps_velocities_and_forces(regular, change, damping):
     assert net[1] == pytest.approx(net[0], abs=1e-5 * force)
 
 
+@pytest.mark.usefixtures("quick_pictures")
 def test_command(command, tmp_path):
     file = tmp_path / "regular.toml"
     file.write_text(configuration().to_toml())

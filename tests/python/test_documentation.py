@@ -26,6 +26,8 @@ import typer
 from conftest import ROOT, long
 from mesoslip import Config
 from mesoslip.analysis.regime.result import NAMES as REGIMES
+from mesoslip.analysis.regime.result import REGIME
+from mesoslip.campaign.measures import MEASURES
 from mesoslip.campaign.sweep_plan import Plan
 from mesoslip.command_line.main import app
 from mesoslip.configuration.contacts.tables import COUPLINGS, INITIAL_STATES
@@ -33,6 +35,7 @@ from mesoslip.configuration.sliders import DEFAULT as DEFAULT_SLIDER
 from mesoslip.configuration.sliders import SLIDERS
 from mesoslip.configuration.threshold_laws import LAWS
 from mesoslip.inference.fit_plan import Plan as FitPlan
+from mesoslip.measured.reading.file import READERS
 from mesoslip.plots.views import VIEWS
 
 DOCS = ROOT / "docs"
@@ -81,7 +84,9 @@ SHORTER = {
     '[run]\nengine = "eq"': '[curve]\nlength = "40 nm"\n\n[run]\nresolution = 1.0\nengine = "eq"',
 }
 FORMULAS = [name for name, law in LAWS.items() if not law.is_sampled]
-# Lists of names that pages have: the passage, the form of a name in it, and all names.
+FORMATS = {re.split("[ -]", one.kind)[0] for one in READERS}
+# Lists of names that pages have: the passage, the form of a name in it, with hyphens or as it is,
+# and all names.
 LISTS = [
     ("README.md", r'law = "weibull" +# ([^\n]*)', r"\b{}\b", FORMULAS),
     ("README.md", r"\n\| to \| set \|.*?\n\n", 'slider.kind = "{}"', {*SLIDERS} - {DEFAULT_SLIDER}),
@@ -92,6 +97,8 @@ LISTS = [
     ("docs/model.md", r"\*\*Coupling\.\*\*.*?\n\n", "`{}`", COUPLINGS),
     ("docs/model.md", r"\*\*Starts\.\*\*.*?\n\n", "`{}`", INITIAL_STATES),
     ("docs/regimes.md", r"\| regime \| number \|.*?\n\n", r"\| {} \|", REGIMES),
+    ("docs/campaigns.md", r"\| measure \| meaning \|.*?\n\n", "`{1}`", MEASURES.keys() - REGIME),
+    ("docs/how-to/measured-files.md", r"\| files \| [^\n]*", "{}", FORMATS),
 ]
 HISTORY = "time [s],displacement [um]\n0,0\n1,0.1\n2,0.3\n"
 STATUS = re.compile(r"exit status (\d+)")
@@ -343,7 +350,7 @@ def test_lists_of_names_are_complete(page, passage, form, names):
     """A page that lists kinds lists all that the program has."""
     listed = re.search(passage, (ROOT / page).read_text(encoding="utf-8"), re.DOTALL)
     assert listed, f"{page} has no {passage}"
-    shown = {name: form.format(name.replace("_", "-")) for name in names}
+    shown = {name: form.format(name.replace("_", "-"), name) for name in names}
     missing = [name for name in names if not re.search(shown[name], listed[0])]
     assert not missing, f"{page} does not list {missing}"
 
@@ -518,3 +525,20 @@ def test_metadata_agree():
     cited = set(re.findall(r"@(\w+)", (ROOT / "paper" / "paper.md").read_text(encoding="utf-8")))
     entries = set(re.findall(r"@\w+\{(\w+),", (ROOT / "paper" / "paper.bib").read_text()))
     assert cited == entries
+
+
+def test_files_that_the_architecture_names_exist():
+    """Paths in its table of additions, below the root or the package."""
+    text = (DOCS / "architecture.md").read_text(encoding="utf-8")
+    named = set(re.findall(r"`([\w./]+/[\w.]+\.(?:py|pyi|f90|md|build))`", text))
+    named = {one for one in named if not re.search(r"\b[A-Z]{3,}\b", one)}
+    assert len(named) > 20
+    folders = (ROOT, ROOT / "python" / "mesoslip", ROOT / "fortran")
+    assert not {
+        one
+        for one in named
+        if not any(
+            place.joinpath(one).is_file() or place.joinpath(f"{one}.in").is_file()
+            for place in folders
+        )
+    }

@@ -77,7 +77,8 @@ def test_frequencies_of_the_free_chain(klein, layers):
         slider=layered(layers),
         contacts__reattach=False,
         contacts__drag_rate=0.0,
-        run__duration=1.96,
+        drive__velocity=1e-6,
+        run__duration=0.2,
         output__interval=2e-6,
         output__layers=True,
     )
@@ -203,9 +204,10 @@ def test_static_stiffness(klein):
     "more",
     [{}, {"base": BASE}, {"layer_damping": 30.0}, {"layer_damping": 30.0, "base": BASE}],
 )
-@pytest.mark.parametrize("engine", ["eq", "me"])
-def test_energy_balance_closes(klein, more, engine):
-    realization = finish(klein(slider=layered(16, **more), run__duration=3.0, run__engine=engine))
+@pytest.mark.parametrize(("engine", "layers"), [("eq", 16), ("me", 4)])
+def test_energy_balance_closes(klein, more, engine, layers):
+    slider = layered(layers, **more)
+    realization = finish(klein(slider=slider, run__duration=3.0, run__engine=engine))
     assert abs(realization.energy_residual) < (1e-11 if engine == "eq" else 1e-4)
     assert realization.breaks > 4080
 
@@ -257,8 +259,9 @@ def test_an_independent_cvode(klein):
         contacts__reattach=False,
         contacts__drag_rate=0.0,
         contacts__threshold={"law": "uniform", "relative_width": 0.3},
-        run__duration=1.9,
-        output__interval=1e-3,
+        drive__velocity=1e-6,
+        run__duration=0.19,
+        output__interval=1e-4,
     )
     realization = Realization(config, 0)
     realization.advance(1)
@@ -273,7 +276,7 @@ def test_an_independent_cvode(klein):
         rate[:] = matrix @ state
         force = k * state[1] * np.sum(limits > displacement)
         rate[n + 1] -= force / masses[1]
-        rate[-1] += STIFFNESS * layers * 1e-7 * time / masses[-1]
+        rate[-1] += STIFFNESS * layers * 1e-6 * time / masses[-1]
 
     # Break by break: contacts that have broken stay so.
     solver = sksundae.cvode.CVODE
@@ -288,7 +291,7 @@ def test_an_independent_cvode(klein):
         reach.threshold = threshold
         reach.terminal = [True]
         reach.direction = [1]
-        grid = np.concatenate([[start], np.arange(np.floor(start * 1e3) + 1, 1901) * 1e-3])
+        grid = np.concatenate([[start], np.arange(np.floor(start * 1e4) + 1, 1901) * 1e-4])
         if len(grid) < 2:
             break
         result = solver(
@@ -296,9 +299,9 @@ def test_an_independent_cvode(klein):
         ).solve(grid, state)
         inside = np.isin(result.t, grid[1:])
         times.extend(result.t[inside])
-        forces.extend(1e-7 * result.t[inside] - result.y[inside, layers])
+        forces.extend(1e-6 * result.t[inside] - result.y[inside, layers])
         state, start = result.y[-1], result.t[-1]
-        if start >= 1.9 - 1e-12:
+        if start >= 0.19 - 1e-12:
             break
     ours = np.interp(times, realization.trace[:, 0], realization.trace[:, 4])
     theirs = STIFFNESS * layers * np.array(forces)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 import mesoslip
 import numpy as np
 import pytest
@@ -29,6 +31,7 @@ def force_of(config):
     return tree["displacement"].values.ravel(), tree["contact_force"].values.ravel()
 
 
+@functools.cache
 def steady(coupling):
     """⟨k (x_s² - x_b²)/2⟩/⟨x_s - x_b⟩ over thresholds and forces at attaching, by quadrature."""
     u, f = np.meshgrid(np.linspace(0.1, 2.5, 2001)[1:], np.linspace(-0.6, 0.8, 1401))

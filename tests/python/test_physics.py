@@ -73,7 +73,7 @@ def test_the_delay_weakens_the_force_with_velocity(klein, law, coupling):
         {
             "contacts__count": 10**6,
             "drive__velocity": 1e-5,
-            "run__duration": 0.024,
+            "run__duration": 0.02,
             "output__interval": 1e-4,
         },
         {"slider": {"kind": "prescribed"}, "run__duration": 1.0},

@@ -18,7 +18,7 @@ from mesoslip.quantities import column
 from mesoslip.reports.method_paragraphs import cycle_method
 from mesoslip.reports.sections import SECTIONS
 
-pytestmark = pytest.mark.usefixtures("few_replicas")
+pytestmark = pytest.mark.usefixtures("few_replicas", "quick_pictures")
 
 MOST_BYTES = 3_000_000
 # Elements of HTML that have no end.

@@ -15,6 +15,10 @@ import mutants
 import numpy as np
 import pytest
 from conftest import ROOT
+from kinds import KINDS as RUNS
+from kinds import configuration
+from mesoslip.configuration import contacts
+from mesoslip.configuration.contacts.tables import Contacts
 from mesoslip.configuration.sliders import SLIDERS
 from mesoslip.configuration.threshold_laws import LAWS
 from scipy.sparse import csgraph
@@ -256,6 +260,40 @@ def test_sliders_are_the_same_on_both_sides():
     assert not set(SLIDERS) - set(kinds)
 
 
+def test_kinds_of_contacts_are_the_same_on_both_sides():
+    """A kind that a list forgets, a key that no kind answers, and a kernel that nobody asks for."""
+    text = (FORTRAN / "contacts.f90").read_text()
+    made = r"subroutine (make_(?:contact_)?\w+)\(contacts, common, parameters"
+    makers = {
+        name
+        for path in (FORTRAN / "contacts").rglob("*.f90")
+        for name in re.findall(made, path.read_text())
+    }
+    assert len(makers) > 5
+    assert makers == set(re.findall(r"call (make_\w+)\(contacts,", text))
+    kinds = {kind.kernel_kind for kind in contacts.KINDS}
+    assert kinds == set(re.findall(r'^ +case \("([\w ]+)"\)', text, re.MULTILINE))
+    room = Path(contacts.__file__).parent
+    classes = r"^    kernel_kind: ClassVar\[str\] = \"([\w ]+)\""
+    assert kinds == {
+        name
+        for path in room.glob("*.py")
+        for name in re.findall(classes, path.read_text(), re.MULTILINE)
+    }
+    answered = contacts.COMMON_KEYS.union(*(kind.features for kind in contacts.KINDS))
+    assert {f"contacts.{key}" for key in Contacts.model_fields} <= answered
+
+
+def test_short_runs_have_every_kind():
+    """What must hold of all kinds is tested with them: resuming, drives, reports, pictures."""
+    runs = [configuration(kind) for kind in RUNS]
+    assert {one.contact_kind.kernel_kind for one in runs} == {
+        kind.kernel_kind for kind in contacts.KINDS
+    }
+    assert {one.slider.kind for one in runs} == set(SLIDERS)
+    assert {one.contacts.threshold.law for one in runs} >= {"gaussian", "table"}
+
+
 def test_procedures_in_fortran_are_short():
     """None has more than 100 lines."""
     kind = "(?:subroutine|function)"
@@ -315,31 +353,6 @@ def test_wrong_imports_of_python_are_found(tmp_path):
     assert result.returncode == 1
     for room, module in PLANTS.items():
         assert f"mesoslip.{room}.planted -> mesoslip.{module}" in result.stdout, room
-
-
-def test_every_file_of_the_package_is_listed():
-    text = (ROOT / "python" / "meson.build").read_text()
-    listed = {
-        f"{folder}/{name}".removeprefix("./")
-        for folder, names in re.findall(r"^  '([\w./]+)': \[\n(.*?)^  \]", text, re.M | re.S)
-        for name in re.findall(r"'([\w.]+)'", names)
-    }
-    package = ROOT / "python" / "mesoslip"
-    there = {
-        path.relative_to(package).as_posix()
-        for path in package.rglob("*")
-        if path.suffix in {".py", ".pyi", ".typed", ".html", ".mplstyle"}
-        and "__pycache__" not in path.parts
-    }
-    assert listed == there | {"py.typed"}
-
-
-def test_every_file_in_fortran_is_listed():
-    for path in sources():
-        folder, name = path.parent, path.name
-        while not (folder / "meson.build").exists():
-            name, folder = f"{folder.name}/{name}", folder.parent
-        assert name in (folder / "meson.build").read_text(), path
 
 
 def test_mutants_are_of_these_sources():

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.ticker import LogFormatterSciNotation, LogLocator, NullFormatter
+from matplotlib.ticker import LogFormatterSciNotation, LogLocator, MaxNLocator, NullFormatter
 
 from mesoslip.quantities import number
 
@@ -35,13 +35,15 @@ class _Locator(LogLocator):
         if not 0 < low < high or math.log10(high / low) >= MANY_DECADES:
             return super().tick_values(vmin, vmax)
         powers = 10.0 ** np.arange(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
-        for multiples in MULTIPLES:
-            places = np.unique(np.outer(powers, multiples).round(12).ravel())
+        candidates = [np.unique(np.outer(powers, one).round(12).ravel()) for one in MULTIPLES]
+        # Over a few per cent, at equal distances.
+        candidates.append(MaxNLocator(MIN_LABELS + 1).tick_values(low, high))
+        for places in candidates:
             inside = places[(places >= low) & (places <= high)]
             if len(inside) >= MIN_LABELS:
                 break
         step = math.ceil(len(inside) / (2 * MIN_LABELS))
-        chosen: list[float] = inside[::step].tolist()
+        chosen: list[float] = inside[:: max(step, 1)].tolist()
         return chosen
 
 

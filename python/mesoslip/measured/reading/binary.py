@@ -65,24 +65,37 @@ class Found(NamedTuple):
         return values.reshape(self.columns, self.rows)
 
 
-# Opens the content of a file, whose arrays can be loaded until it is closed.
-Reader = Callable[[bytes], AbstractContextManager[Sequence[Found]]]
+class Contents(NamedTuple):
+    """The arrays of a file, and notes about it."""
+
+    arrays: Sequence[Found]
+    notes: Sequence[str] = ()
 
 
-def read_arrays(kind: str, path: Path, data: bytes, arrays: Reader) -> Table:
+class Reader(NamedTuple):
+    """A format: its name, the first bytes of its files, and what opens their content, whose arrays
+    can be loaded until it is closed."""
+
+    kind: str
+    start: bytes
+    contents: Callable[[bytes], AbstractContextManager[Contents]]
+
+
+def read_binary(reader: Reader, path: Path, data: bytes) -> Table:
     """Read the arrays of a file as columns of a table."""
     try:
-        with LOCK, arrays(data) as found:
-            return _table(kind, path, found)
+        with LOCK, reader.contents(data) as found:
+            return _table(reader.kind, path, found)
     except FileError as error:
         raise FileError(f"{path}: {error}") from None
     # Libraries raise errors of any type for a damaged file.
     except Exception as error:
-        raise FileError(f"{path}: a damaged file of {kind}: {error}") from None
+        raise FileError(f"{path}: a damaged file of {reader.kind}: {error}") from None
 
 
-def _table(kind: str, path: Path, found: Sequence[Found]) -> Table:
+def _table(kind: str, path: Path, contents: Contents) -> Table:
     """Arrays of the usual length as the columns of a table; only these are loaded."""
+    found = contents.arrays
     others = [f"{one.name} ({_described(one)})" for one in found if not one.columns]
     tables = [one for one in found if one.columns]
     counts: Counter[int] = Counter()
@@ -111,7 +124,7 @@ def _table(kind: str, path: Path, found: Sequence[Found]) -> Table:
         np.arange(1, length + 1),
         {},
         False,
-        notes,
+        [*notes, *contents.notes],
     )
 
 
@@ -154,7 +167,7 @@ def _fields(name: str, shape: Sequence[int], dtype: Any, load: Callable[..., Any
 
 
 @contextmanager
-def _npz(data: bytes) -> Iterator[list[Found]]:
+def _npz(data: bytes) -> Iterator[Contents]:
     found: list[Found] = []
     with zipfile.ZipFile(BytesIO(data)) as archive:
         for member in archive.namelist():
@@ -163,15 +176,14 @@ def _npz(data: bytes) -> Iterator[list[Found]]:
                     shape, dtype = _npy_header(file)
                 load = partial(_npy_array, partial(archive.open, member))
                 found += _fields(member.removesuffix(".npy"), shape, dtype, load)
-        yield found
+        yield Contents(found)
 
 
 @contextmanager
-def _npy(data: bytes) -> Iterator[list[Found]]:
+def _npy(data: bytes) -> Iterator[Contents]:
     shape, dtype = _npy_header(BytesIO(data))
-    yield _fields(
-        "" if dtype.names else "data", shape, dtype, partial(_npy_array, partial(BytesIO, data))
-    )
+    load = partial(_npy_array, partial(BytesIO, data))
+    yield Contents(_fields("" if dtype.names else "data", shape, dtype, load))
 
 
 def _npy_header(file: IO[bytes]) -> tuple[tuple[int, ...], np.dtype[Any]]:
@@ -193,17 +205,18 @@ def _npy_array(open_file: Callable[[], IO[bytes]], field: str | None = None) -> 
 
 
 @contextmanager
-def _matlab(data: bytes) -> Iterator[list[Found]]:
+def _matlab(data: bytes) -> Iterator[Contents]:
     from scipy.io import loadmat
 
     _check_unpacked(data)
     contents = loadmat(BytesIO(data), squeeze_me=True, struct_as_record=False)
-    yield [
+    found = [
         one
         for name, value in contents.items()
         if not name.startswith("__")
         for one in _structure(name, value, 0)
     ]
+    yield Contents(found)
 
 
 def _check_unpacked(data: bytes) -> None:
@@ -233,7 +246,7 @@ def _structure(name: str, value: Any, depth: int) -> Iterator[Found]:
 
 
 @contextmanager
-def _hdf5(data: bytes) -> Iterator[list[Found]]:
+def _hdf5(data: bytes) -> Iterator[Contents]:
     """Data sets of groups, except links, and data in other files."""
     import h5py
 
@@ -258,7 +271,7 @@ def _hdf5(data: bytes) -> Iterator[list[Found]]:
                     groups.append((f"{name}/", target))
                 elif isinstance(target, h5py.h5d.DatasetID):
                     found += _data_set(name, h5py.Dataset(target))
-        yield found
+        yield Contents(found)
 
 
 def _data_set(name: str, one: Any) -> list[Found]:
@@ -320,11 +333,11 @@ def _text(value: Any) -> str:
 
 
 @contextmanager
-def _netcdf3(data: bytes) -> Iterator[list[Found]]:
+def _netcdf3(data: bytes) -> Iterator[Contents]:
     from scipy.io import netcdf_file
 
     with netcdf_file(BytesIO(data), "r", mmap=False) as file:
-        yield [
+        found = [
             _packed(
                 name,
                 one.data.shape,
@@ -334,19 +347,15 @@ def _netcdf3(data: bytes) -> Iterator[list[Found]]:
             )
             for name, one in file.variables.items()
         ]
+        yield Contents(found)
 
 
-def _reader(kind: str, arrays: Reader) -> Callable[[Path, bytes], Table]:
-    return lambda path, data: read_arrays(kind, path, data, arrays)
-
-
-# Readers by the first bytes of a file.
 READERS = (
-    (b"PK\x03\x04", _reader("NumPy (.npz)", _npz)),
-    (b"\x93NUMPY", _reader("NumPy (.npy)", _npy)),
-    (b"MATLAB 5.0", _reader("MATLAB", _matlab)),
-    (b"MATLAB 7.3", _reader("MATLAB 7.3 (HDF5)", _hdf5)),
-    (HDF5, _reader("HDF5 or netCDF-4", _hdf5)),
-    (b"CDF\x01", _reader("netCDF-3", _netcdf3)),
-    (b"CDF\x02", _reader("netCDF-3", _netcdf3)),
+    Reader("NumPy (.npz)", b"PK\x03\x04", _npz),
+    Reader("NumPy (.npy)", b"\x93NUMPY", _npy),
+    Reader("MATLAB", b"MATLAB 5.0", _matlab),
+    Reader("MATLAB 7.3 (HDF5)", b"MATLAB 7.3", _hdf5),
+    Reader("HDF5 or netCDF-4", HDF5, _hdf5),
+    Reader("netCDF-3", b"CDF\x01", _netcdf3),
+    Reader("netCDF-3", b"CDF\x02", _netcdf3),
 )

@@ -3,26 +3,27 @@
 from __future__ import annotations
 
 import zipfile
-from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
 
 from mesoslip.errors import FileError
-from mesoslip.measured.reading.binary import READERS
+from mesoslip.measured.reading import binary, tdms
+from mesoslip.measured.reading.binary import read_binary
 from mesoslip.measured.reading.source import bytes_of, text_of
 from mesoslip.measured.reading.spreadsheet import MEMBER, text_of_workbook
 from mesoslip.measured.reading.table import Table
-from mesoslip.measured.reading.tdms import read_tdms
 from mesoslip.measured.reading.text import read_text
+
+# Formats that are known by the first bytes of a file.
+READERS = (*binary.READERS, tdms.READER)
 
 
 def read_file(
     path: Path, *, decimal: str | None = None, has_headers: bool = False, sheet: str | None = None
 ) -> Table:
-    """Read a file of text, which may be compressed, a workbook, LabVIEW, MATLAB, HDF5, netCDF or
-    NumPy.
+    """Read a file of text, which may be compressed, a workbook, or a format of `READERS`.
 
     By default the decimal sign of a text is found from its numbers. ``has_headers`` is whether
     there are other headers than those of the file; ``sheet`` is that of a workbook.
@@ -35,19 +36,14 @@ def read_file(
         return replace(table, notes=[note, *table.notes[1:]])
     if sheet is not None:
         raise FileError(f"{path}: is not a workbook (.xlsx), and has no sheet {sheet!r}")
-    reader = _reader(data)
-    if reader is not None:
-        return reader(path, data)
+    for reader in READERS:
+        if data.startswith(reader.start):
+            return read_binary(reader, path, data)
     if path.suffix == ".toml":
         raise FileError(f"{path}: is a configuration, not a measurement")
-    data = text_of(path, data)
-    return read_text(path, data, decimal=decimal, has_headers=has_headers)
-
-
-def _reader(data: bytes) -> Callable[[Path, bytes], Table] | None:
-    """The reader of a file that is not text, by its first bytes."""
-    every = ((b"TDSm", read_tdms), *READERS)
-    return next((read for start, read in every if data.startswith(start)), None)
+    others = ", ".join(dict.fromkeys(one.kind for one in READERS))
+    text = text_of(path, data, f"a workbook (.xlsx), {others}")
+    return read_text(path, text, decimal=decimal, has_headers=has_headers)
 
 
 def _is_workbook(data: bytes) -> bool:

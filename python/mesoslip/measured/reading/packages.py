@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from importlib import import_module
-from pathlib import Path
 from typing import Any
 
 from mesoslip.errors import FileError
 
 
-def needed(module: str, path: Path, kind: str, package: str) -> Any:
+def needed(module: str, kind: str, package: str) -> Any:
     """A module, or a message that names the package to install."""
     try:
         return import_module(module)
     except ImportError:
         raise FileError(
-            f"{path}: is {kind}, which needs {package}: pip install 'mesoslip[files]', or export "
-            "the measurement as text"
+            f"is {kind}, which needs {package}: pip install 'mesoslip[files]', or export the "
+            "measurement as text"
         ) from None

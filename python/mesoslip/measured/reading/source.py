@@ -101,10 +101,11 @@ def _limited(path: Path, file: IO[bytes]) -> bytes:
     return data
 
 
-def text_of(path: Path, data: bytes) -> bytes:
+def text_of(path: Path, data: bytes, others: str) -> bytes:
     """The text of a file in UTF-8, from that, UTF-16 or an encoding of Western Europe.
 
     Line breaks are `\\n`, and minus signs hyphens. A text that is like this already is not copied.
+    ``others`` are the formats besides text.
     """
     text = _in_utf8(data)
     if text is not None and 0 < text.count(b"\0") < MAX_NULLS * len(text):
@@ -112,8 +113,7 @@ def text_of(path: Path, data: bytes) -> bytes:
         raise FileError(f"{path}: line {text.count(NEWLINE, 0, at) + 1}: has a null character")
     if text is None or b"\0" in text:
         raise FileError(
-            f"{path}: is neither text nor .xlsx, .tdms, MATLAB, HDF5, netCDF or .npz: it begins "
-            f"with {shown(data[:12])}"
+            f"{path}: is no text, and no file of {others}: it begins with {shown(data[:12])}"
         )
     for old, new in PLAIN:
         if old in text:

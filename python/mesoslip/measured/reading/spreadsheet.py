@@ -21,8 +21,8 @@ def text_of_workbook(path: Path, data: bytes, sheet: str | None) -> tuple[bytes,
 
     The sheet is the given one, or the one with the most numbers. Line n of the text is row n.
     """
-    openpyxl = needed("openpyxl", path, "a workbook (.xlsx)", "openpyxl")
     try:
+        openpyxl = needed("openpyxl", "a workbook (.xlsx)", "openpyxl")
         # Without links to other workbooks, and with the results of formulas.
         book = openpyxl.load_workbook(
             BytesIO(data), read_only=True, data_only=True, keep_links=False
@@ -30,13 +30,11 @@ def text_of_workbook(path: Path, data: bytes, sheet: str | None) -> tuple[bytes,
         sheets = {one.title: one for one in book.worksheets}
         if sheet is not None and sheet not in sheets:
             names = ", ".join(shown(one) for one in sheets)
-            raise FileError(f"{path}: has no sheet {shown(sheet)}; its sheets are {names}")
+            raise FileError(f"has no sheet {shown(sheet)}; its sheets are {names}")
         asked = sheets if sheet is None else {sheet: sheets[sheet]}
-        texts = {
-            title: _lines(path, one.iter_rows(values_only=True)) for title, one in asked.items()
-        }
-    except FileError:
-        raise
+        texts = {title: _lines(one.iter_rows(values_only=True)) for title, one in asked.items()}
+    except FileError as error:
+        raise FileError(f"{path}: {error}") from None
     # The library raises errors of any type for a damaged file.
     except Exception as error:
         raise FileError(f"{path}: a damaged workbook (.xlsx): {error}") from None
@@ -53,7 +51,7 @@ def text_of_workbook(path: Path, data: bytes, sheet: str | None) -> tuple[bytes,
     return text, note
 
 
-def _lines(path: Path, rows: Iterable[tuple[Any, ...]]) -> tuple[bytes, int]:
+def _lines(rows: Iterable[tuple[Any, ...]]) -> tuple[bytes, int]:
     """Rows of cells as lines with tabs, and how many numbers they have."""
     lines: list[bytes] = []
     size = numbers = 0
@@ -64,7 +62,7 @@ def _lines(path: Path, rows: Iterable[tuple[Any, ...]]) -> tuple[bytes, int]:
         )
         size += len(lines[-1])
         if size > MAX_BYTES:
-            raise FileError(f"{path}: is too large; export the measurement as text")
+            raise FileError("is too large; export the measurement as text")
     return b"\n".join([*lines, b""]), numbers
 
 

@@ -5,28 +5,30 @@ from __future__ import annotations
 import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from functools import partial
 from io import BytesIO
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from mesoslip.measured.reading.binary import Found, read_arrays
+from mesoslip.measured.reading.binary import Contents, Found, Reader
 from mesoslip.measured.reading.packages import needed
-from mesoslip.measured.reading.table import Table
 
 # Properties of a channel that have its unit, in order of preference.
 UNIT_PROPERTIES = ("unit_string", "unit", "Unit", "NI_UnitDescription")
 
 
-def read_tdms(path: Path, data: bytes) -> Table:
-    """Read the channels of a file of LabVIEW as a table."""
-    library = needed("nptdms", path, "a file of LabVIEW (.tdms)", "npTDMS")
-    with _warnings(library) as found:
-        table = read_arrays("LabVIEW (.tdms)", path, data, partial(_channels, library))
-    return replace(table, notes=[*table.notes, *found])
+@contextmanager
+def _channels(data: bytes) -> Iterator[Contents]:
+    library = needed("nptdms", "a file of LabVIEW (.tdms)", "npTDMS")
+    with _warnings(library) as warnings, library.TdmsFile.open(BytesIO(data)) as file:
+        groups = [group for group in file.groups() if group.channels()]
+        found: list[Found] = []
+        for group in groups:
+            # Names of groups distinguish channels of several groups only.
+            before = f"{group.name}/" if len(groups) > 1 else ""
+            found += _timed(before, group.channels())
+        yield Contents(found, warnings)
 
 
 @contextmanager
@@ -44,18 +46,6 @@ def _warnings(library: Any) -> Iterator[list[str]]:
     finally:
         for one, before in zip(loggers, handlers, strict=True):
             one.handlers = before
-
-
-@contextmanager
-def _channels(library: Any, data: bytes) -> Iterator[list[Found]]:
-    with library.TdmsFile.open(BytesIO(data)) as file:
-        groups = [group for group in file.groups() if group.channels()]
-        found: list[Found] = []
-        for group in groups:
-            # Names of groups distinguish channels of several groups only.
-            before = f"{group.name}/" if len(groups) > 1 else ""
-            found += _timed(before, group.channels())
-        yield found
 
 
 def _timed(before: str, channels: list[Any]) -> Iterator[Found]:
@@ -92,3 +82,6 @@ def _seconds(channel: Any) -> Any:
     """Time stamps as seconds from the first one."""
     stamps = np.asarray(channel[:], dtype="datetime64[ns]")
     return (stamps - stamps[:1]) / np.timedelta64(1, "s")
+
+
+READER = Reader("LabVIEW (.tdms)", b"TDSm", _channels)

@@ -19,7 +19,7 @@ from mesoslip.errors import RunError
 from mesoslip.output import variables
 from mesoslip.simulation import recorded_tables as tables
 from mesoslip.simulation.kernel import RESERVE, Kernel, name_list
-from mesoslip.simulation.kernel_setup import configured_kernel
+from mesoslip.simulation.kernel_setup import KernelSetup
 from mesoslip.simulation.realization import ENDINGS
 from mesoslip.theory.lives import Scales
 from mesoslip.theory.slip_onset import EQUATIONS, Onset
@@ -124,7 +124,7 @@ def test_copied_contacts_are_those_made_anew(kind):
     template = with_contacts(config)
     states = []
     for one in (template, template, config.contact_kind.kernel_parameters(config)):
-        kernel = configured_kernel(config, one)
+        kernel = KernelSetup(config, one).open()
         kernel.start(config.contacts.initial)
         kernel.advance(40, 1e18)
         states.append(kernel.save().tolist())
@@ -136,7 +136,7 @@ def test_contacts_that_cannot_be_copied():
     config = configuration("rigid")
     with pytest.raises(RunError, match="has no contacts"):
         Kernel().copy_contacts(Kernel())
-    started = configured_kernel(config, with_contacts(config))
+    started = KernelSetup(config, with_contacts(config)).open()
     started.start("relaxed")
     with pytest.raises(RunError, match="was started"):
         Kernel().copy_contacts(started)

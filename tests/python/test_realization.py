@@ -6,17 +6,23 @@ import doctest
 
 import numpy as np
 import pytest
-from mesoslip import Realization, RunError
-from mesoslip.simulation.recorded_tables import COLUMNS
+from conftest import klein_tables
+from kinds import KINDS, configuration
+from mesoslip import Config, Realization, RunError
+from mesoslip.execution.local import LocalPool
+from mesoslip.execution.stop import Stop
+from mesoslip.output import layout
+from mesoslip.simulation import realization
+from mesoslip.simulation.checkpoint import Checkpoint
+from mesoslip.simulation.kernel_setup import tables_of
+from mesoslip.simulation.recorded_tables import COLUMNS, TABLES
+from mesoslip.simulation.run_realizations import run_realizations
 
 SHORT = {"contacts__count": 200, "run__duration": 2.5, "output__slip_interval": 1e-3}
 
 
 @pytest.fixture(scope="module")
 def whole():
-    from conftest import klein_tables
-    from mesoslip import Config
-
     one = Realization(Config.from_dict(klein_tables(**SHORT)))
     while not one.finished:
         one.advance()
@@ -69,3 +75,71 @@ def test_the_example_of_its_documentation_runs(tmp_path, monkeypatch):
     finder = doctest.DocTestFinder(recurse=False)
     (example,) = finder.find(Realization, "Realization")
     assert doctest.DocTestRunner().run(example).failed == 0
+
+
+@pytest.mark.parametrize("kind", list(KINDS))
+def test_tables_that_are_not_drained_stay_empty(kind):
+    run = Realization(configuration(kind))
+    run.advance(2000)
+    kernel = run._open()
+    for table in set(TABLES) - set(tables_of(run.config)):
+        assert not len(kernel.drain(table)), table
+
+
+FEW = {"contacts__count": 2, "run__duration": 2e-3, "output__interval": 1e-3}
+
+
+def test_realizations_that_share_their_setting_are_those_made_alone():
+    config = configuration("rigid, three realizations")
+    for number, one in enumerate(Realization.all_of(config)):
+        alone = Realization(config, number)
+        for run in (one, alone):
+            run.advance(500)
+        np.testing.assert_array_equal(one.trace, alone.trace)
+        np.testing.assert_array_equal(one.contacts["origin"], alone.contacts["origin"])
+
+
+def test_many_short_realizations_are_set_up_once_and_handed_over_in_batches(monkeypatch):
+    submitted, checked = [], []
+    submit, check = LocalPool.submit, realization.check_memory
+    monkeypatch.setattr(
+        LocalPool, "submit", lambda *given: submitted.append(given[2]) or submit(*given)
+    )
+    monkeypatch.setattr(realization, "check_memory", lambda one: checked.append(one) or check(one))
+    config = Config.from_dict(klein_tables(run__realizations=1000, **FEW))
+    results = run_realizations(config, executor=2)
+    assert results.complete
+    assert len(checked) == 1
+    assert sum(map(len, submitted)) == 1000
+    assert len(submitted) < 200
+
+
+def test_an_interrupted_run_counts_its_realizations():
+    config = Config.from_dict(klein_tables(run__realizations=300, **FEW))
+    stop = Stop()
+    results = run_realizations(
+        config, executor=1, progress=lambda part: part and stop.set(), stop=stop
+    )
+    done = sum(one.finished for one in results.realizations)
+    assert 0 < done < 300
+    assert layout.interruption(results.realizations) == (
+        f"interrupted; {done} of 300 realizations are complete, 0 under way"
+    )
+    for one in results.realizations:
+        one.advance(1)
+    assert "all others reached" in layout.interruption(results.realizations)
+
+
+def test_rows_in_memory_are_counted_as_they_come(tmp_path):
+    """Not summed up over all realizations each time."""
+    config = Config.from_dict(klein_tables(run__realizations=5, **FEW))
+    with Checkpoint(tmp_path / "run.checkpoint", config) as checkpoint:
+        realizations = Realization.all_of(config)
+        for one in realizations[:3]:
+            for _ in range(3):
+                one.advance(2)
+                checkpoint.visit(one)
+        expected = sum(rows.waiting_bytes for one in realizations for _, rows in one.waiting)
+        assert checkpoint._waiting_bytes == expected > 0
+        assert checkpoint.write(realizations)
+        assert checkpoint._waiting_bytes == 0

@@ -133,7 +133,7 @@ def _keep(results: Results, path: Path, stop: Stop, checkpoint: Checkpoint) -> i
 
     from mesoslip.output import layout, writing
 
-    message = str(layout.attributes(results)["comment"])
+    message = layout.interruption(results.realizations)
     is_kept = checkpoint.saved_time is not None
     if is_kept:
         message += "; the same command with --resume continues from the checkpoint"

@@ -23,9 +23,12 @@ def checked(**checks: Check) -> Callable[[Callable[P, T]], Callable[P, T]]:
 
     def decorate(function: Callable[P, T]) -> Callable[P, T]:
         signature = inspect.signature(function)
+        first = min(map(list(signature.parameters).index, checks))
 
         @functools.wraps(function)
         def call(*args: P.args, **kwargs: P.kwargs) -> T:
+            if len(args) <= first and not kwargs:
+                return function(*args, **kwargs)
             bound = signature.bind(*args, **kwargs)
             problems = []
             for name, check in checks.items():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,13 +15,18 @@ Parameters = dict[str, float | str | tuple[float, ...]]
 NAME_LENGTH = 32
 
 
-def named(
-    parameters: Mapping[str, float | str | tuple[float, ...]],
-) -> tuple[Names, NDArray[np.float64], Names]:
-    """Arrays of names, numbers and words; the name of a list is repeated for each of its numbers.
+class Named(NamedTuple):
+    """Arrays of names, numbers and words; a word has the number 0, and a number an empty word."""
 
-    A word has the number 0, and a number an empty word.
-    """
+    names: Names
+    numbers: NDArray[np.float64]
+    words: Names
+
+
+def named(parameters: Mapping[str, float | str | tuple[float, ...]] | Named) -> Named:
+    """Parameters as arrays; the name of a list is repeated for each of its numbers."""
+    if isinstance(parameters, Named):
+        return parameters
     names: list[str] = []
     numbers: list[float] = []
     words: list[str] = []
@@ -30,7 +36,7 @@ def named(
         numbers += [0.0 if isinstance(one, str) else float(one) for one in several]
         words += [one if isinstance(one, str) else "" for one in several]
     # f2py refuses arrays that share a length if that is 0.
-    return padded(names), np.array(numbers or [0.0]), padded(words or [""])
+    return Named(padded(names), np.array(numbers or [0.0]), padded(words or [""]))
 
 
 def padded(words: Iterable[str]) -> Names:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mesoslip import _core
 from mesoslip.configuration import arguments
-from mesoslip.configuration.kernel_parameters import Names, Parameters, named
+from mesoslip.configuration.kernel_parameters import Named, Parameters, named
 from mesoslip.configuration.threshold_laws import LAWS
 from mesoslip.configuration.threshold_laws.table import sample_problem
 from mesoslip.errors import MesoslipError
@@ -97,7 +97,7 @@ class ThresholdLaw:
         return self._kernel(function, values.ravel())[0].reshape(values.shape)
 
     @cached_property
-    def _parameters(self) -> tuple[Names, NDArray[np.float64], Names]:
+    def _parameters(self) -> Named:
         parameters: Parameters = {"threshold_law": self.law}
         return named(parameters | LAWS[self.law].kernel_parameters(self))
 

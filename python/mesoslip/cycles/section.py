@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from mesoslip.simulation.archive import Archive, entries
 from mesoslip.simulation.kernel import Array, Kernel, Words
-from mesoslip.simulation.kernel_setup import NEVER, configured_kernel
+from mesoslip.simulation.kernel_setup import NEVER, KernelSetup
 from mesoslip.simulation.recorded_tables import SLIP_COLUMNS, TRACE_COLUMNS, structured
 
 if TYPE_CHECKING:
@@ -130,9 +130,8 @@ class Motion:
 
     def open(self, words: Words | None, end_time: float = NEVER) -> Kernel:
         """A kernel at a state, or at the start, with a drive that ends at a time [s]."""
-        kernel = configured_kernel(
-            self.config, self._template, end_time=end_time, interval=self.interval
-        )
+        setup = KernelSetup(self.config, self._template, end_time=end_time, interval=self.interval)
+        kernel = setup.open()
         if words is None:
             kernel.start(self.config.contacts.initial)
         else:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import os
 import time
@@ -13,7 +14,7 @@ from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from numbers import Integral
 from queue import Empty, SimpleQueue
-from typing import TYPE_CHECKING, Any, ClassVar, Union
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, Union
 
 from mesoslip.errors import ConfigError, Problem
 from mesoslip.execution.cluster import GONE, ClusterPool, connected
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
 
 # Time between two checks of progress, signals and workers [s].
 POLL_SECONDS = 0.1
+# Time of a batch of short pieces [s], in which handing it over costs little.
+BATCH_SECONDS = 0.05
 
 
 class Executor(ABC):
@@ -191,6 +194,24 @@ def completed(
             for future in running:
                 future.cancel()
             pool.close(max_wait)
+
+
+class Batches(Generic[Piece]):
+    """Pieces in batches that take about `BATCH_SECONDS`, so that short ones cost little more than
+    their own work; a piece that takes longer is a batch of its own."""
+
+    def __init__(self, pieces: Iterable[Piece]) -> None:
+        self._pieces = iter(pieces)
+        self._size = 1
+
+    def __iter__(self) -> Iterator[tuple[Piece, ...]]:
+        while batch := tuple(itertools.islice(self._pieces, self._size)):
+            yield batch
+
+    def finished(self, count: int, seconds: float) -> None:
+        """Learn from a batch of some pieces that took a time [s]."""
+        wanted = count * BATCH_SECONDS / max(seconds, 1e-9)
+        self._size = max(1, min(2 * self._size, int(wanted)))
 
 
 def _first_done(running: Iterable[Future[Any]]) -> Iterator[Future[Any]]:

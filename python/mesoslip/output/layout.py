@@ -24,6 +24,9 @@ from mesoslip.simulation import recorded_tables as tables
 from mesoslip.simulation.audit import failed_checks
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from mesoslip.simulation.realization import Realization
     from mesoslip.simulation.run_realizations import Results
 
 Array = NDArray[Any]
@@ -292,9 +295,7 @@ def attributes(results: Results) -> dict[str, Any]:
     attributes["seed"] = config.run.seed
     attributes["complete"] = "true" if results.complete else "false"
     if not results.complete:
-        each = "it" if len(realizations) == 1 else "every realization"
-        reached = min(one.time for one in realizations)
-        attributes["comment"] = f"interrupted; {each} reached {reached:.6g} s"
+        attributes["comment"] = interruption(realizations)
     residual: float = max((one.energy_residual for one in realizations), key=abs)
     return attributes | {
         "break_count": sum(one.breaks for one in realizations),
@@ -304,3 +305,17 @@ def attributes(results: Results) -> dict[str, Any]:
         "audit": "; ".join(failed_checks(config, realizations)) or "passed",
         "wall_seconds": results.wall_seconds,
     }
+
+
+def interruption(realizations: Sequence[Realization]) -> str:
+    """How far the realizations of an interrupted run are."""
+    under_way = [one for one in realizations if not one.finished]
+    reached = min((one.time for one in under_way), default=0.0)
+    if len(realizations) == 1:
+        return f"interrupted; it reached {reached:.6g} s"
+    complete = len(realizations) - len(under_way)
+    begun = sum(one.advances > 0 for one in under_way)
+    text = f"interrupted; {complete} of {len(realizations)} realizations are complete"
+    if begun < len(under_way):
+        return f"{text}, {begun} under way"
+    return f"{text}, all others reached {reached:.6g} s"

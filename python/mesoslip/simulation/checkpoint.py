@@ -18,11 +18,11 @@ import time
 import tomllib
 import zlib
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from importlib.metadata import version
 from itertools import count
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import IO, TYPE_CHECKING, Any, Self
 
 import numpy as np
 
@@ -100,6 +100,9 @@ class Checkpoint:
         # By number of the realization: the latest state with its epoch, and those with new rows.
         self._saved: dict[int, tuple[int, Saved]] = {}
         self._grown: dict[int, Realization] = {}
+        # Rows of these in memory [bytes]: of each when it was visited, and of all.
+        self._waiting: dict[int, int] = {}
+        self._waiting_bytes = 0
         self._lock = threading.Lock()
         # Number of the latest checkpoint that was due, and of the latest one written.
         self._epoch = self._written = 0
@@ -122,7 +125,10 @@ class Checkpoint:
         saved = None
         if epoch < self._epoch or realization.finished:
             saved = realization.save()
+        waiting = sum(rows.waiting_bytes for _, rows in realization.waiting)
         with self._lock:
+            self._waiting_bytes += waiting - self._waiting.get(realization.number, 0)
+            self._waiting[realization.number] = waiting
             self._grown[realization.number] = realization
             if saved is not None:
                 self._saved[realization.number] = (self._epoch, saved)
@@ -139,11 +145,10 @@ class Checkpoint:
                 self._write(realizations)
         elif 0 < self._interval <= time.perf_counter() - self._last:
             self._epoch += 1
-        with self._lock:
-            grown = list(self._grown.values())
-        waiting = sum(rows.waiting_bytes for one in grown for _, rows in one.waiting)
         is_time = time.perf_counter() - self._last_failure >= RETRY_SECONDS
-        if waiting > MAX_WAITING_BYTES and (is_time or not self._is_failing):
+        if self._waiting_bytes > MAX_WAITING_BYTES and (is_time or not self._is_failing):
+            with self._lock:
+                grown = list(self._grown.values())
             self._attempt(lambda: self._flush(grown))
 
     def write(self, realizations: Sequence[Realization]) -> bool:
@@ -228,23 +233,30 @@ class Checkpoint:
 
     def _flush(self, realizations: Sequence[Realization]) -> None:
         """Append rows in memory to the files."""
-        for one in realizations:
-            with self._lock:
-                self._grown.pop(one.number, None)
-            for table, rows in one.waiting:
-                for number, values in rows.waiting():
-                    rows.store(number, self._append(table, values))
+        files: dict[str, IO[bytes]] = {}
+        with ExitStack() as stack:
+            for one in realizations:
+                with self._lock:
+                    self._grown.pop(one.number, None)
+                    self._waiting_bytes -= self._waiting.pop(one.number, 0)
+                for table, rows in one.waiting:
+                    for number, values in rows.waiting():
+                        if table not in files:
+                            mode = "r+b" if self._sizes[table] else "xb"
+                            file = self._files.open(ROWS.format(table), mode)
+                            files[table] = stack.enter_context(file)
+                        rows.store(number, self._append(files[table], table, values))
 
-    def _append(self, table: str, values: Any) -> Stored:
-        name, place = ROWS.format(table), self._sizes[table]
+    def _append(self, file: IO[bytes], table: str, values: Any) -> Stored:
+        place = self._sizes[table]
         data = np.ascontiguousarray(values, dtype=np.float64)
-        with self._files.open(name, "r+b" if place else "xb") as file:
-            file.seek(place)
-            file.write(data.data)
+        file.seek(place)
+        file.write(data.data)
+        # An error of the disk is that of these rows.
+        file.flush()
         self._sizes[table] = place + data.nbytes
-        return Stored(
-            self.folder / name, place, (data.shape[0], data.shape[1]), zlib.crc32(data.data)
-        )
+        path, shape = self.folder / ROWS.format(table), (data.shape[0], data.shape[1])
+        return Stored(path, place, shape, zlib.crc32(data.data))
 
     def _write(self, realizations: Sequence[Realization]) -> bool:
         self._last = time.perf_counter()

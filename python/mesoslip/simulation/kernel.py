@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip import _core
-from mesoslip.configuration.kernel_parameters import Parameters, named
+from mesoslip.configuration.kernel_parameters import Named, Parameters, named
 from mesoslip.errors import RunError
 
 Array = NDArray[np.float64]
@@ -109,7 +109,9 @@ class Kernel:
     def __reduce__(self) -> NoReturn:
         self.__copy__()
 
-    def set_contacts(self, kind: str, parameters: Parameters, seed: int, realization: int) -> None:
+    def set_contacts(
+        self, kind: str, parameters: Parameters | Named, seed: int, realization: int
+    ) -> None:
         """Make the contacts of a kind from named parameters."""
         self._call(_core.set_contacts, kind, *named(parameters), seed, realization)
 
@@ -118,7 +120,7 @@ class Kernel:
         again."""
         self._call(_core.copy_contacts, template._handle)
 
-    def set_slider(self, kind: str, parameters: Mapping[str, float | str]) -> None:
+    def set_slider(self, kind: str, parameters: Mapping[str, float | str] | Named) -> None:
         """Make the slider of a kind from named parameters."""
         self._call(_core.set_slider, kind, *named(parameters))
 

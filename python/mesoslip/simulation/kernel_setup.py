@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mesoslip.configuration.drive import DrivePart
-from mesoslip.configuration.kernel_parameters import Parameters
+from mesoslip.configuration.kernel_parameters import Parameters, named
 from mesoslip.simulation.kernel import Kernel
+from mesoslip.simulation.recorded_tables import TABLES
 
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
@@ -17,63 +18,94 @@ if TYPE_CHECKING:
 NEVER = float(np.finfo(np.float64).max)
 
 
-def configured_kernel(
-    config: Config,
-    parameters: Parameters | Kernel,
-    number: int = 0,
-    *,
-    start_time: float | None = None,
-    end_time: float | None = None,
-    interval: float | None = None,
-    earlier_slips: int = 0,
-) -> Kernel:
-    """A kernel that can be started or restored; its contacts may be copied from another one.
+class KernelSetup:
+    """The parts of the kernels of a configuration, of which realizations differ in the contacts.
 
-    A run that continues another has ``start_time`` [s], until which the drive has an additional
-    part, and ``earlier_slips``. ``end_time`` [s] of the drive and ``interval`` [s] of the trace
-    replace those of the configuration.
+    Contacts may be copied from another kernel. A run that continues another has ``start_time`` [s],
+    until which the drive has an additional part, and ``earlier_slips``. ``end_time`` [s] of the
+    drive and ``interval`` [s] of the trace replace those of the configuration.
     """
-    slider, contacts, output = config.slider, config.contact_kind, config.output
-    kernel = Kernel()
-    if isinstance(parameters, Kernel):
-        kernel.copy_contacts(parameters)
-    else:
-        kernel.set_contacts(contacts.kernel_kind, parameters, config.run.seed, number)
-    kernel.set_slider(slider.kernel_kind, slider.kernel_parameters(config))
-    parts = config.drive_parts
-    forces = config.drive.start_forces(parts)
-    if start_time is not None:
-        parts = (DrivePart(start_time, 0.0, 0.0, -1), *parts)
-        forces = None if forces is None else (0.0, *forces)
-    durations, start_velocities, end_velocities, stages = (
-        np.array(numbers) for numbers in zip(*parts, strict=True)
-    )
-    ends = np.minimum(np.cumsum(durations), NEVER)
-    if end_time is not None:
-        ends[-1] = min(end_time, NEVER)
-    kernel.set_drive(ends, start_velocities, end_velocities, stages)
-    if forces is not None:
-        kernel.set_drive_values(np.array(forces))
-    stop = config.run.stops
-    kernel.set_stop(
-        slips=stop.slips + earlier_slips if stop.slips else 0,
-        displacement=stop.displacement or 0.0,
-        block_distance=config.steady_block,
-        blocks=stop.steady.blocks if stop.steady else 1,
-        tolerance=stop.steady.tolerance * config.contacts.static_force if stop.steady else 0.0,
-    )
-    kernel.set_recorder(
-        interval=interval or config.output_interval,
-        slip_interval=config.slip_interval or 0.0,
-        slip_velocity=slider.slip_velocity(config),
-        quiet_time=slider.quiet_time,
-        duration=float(ends[-1]),
-        layers=slider.layers_recorded(config),
-    )
-    kernel.set_avalanches(
-        min_size=float(output.avalanche_size or 1) * config.has_avalanches,
-        snapshot_size=float(output.snapshot_size or 0),
-        max_avalanches=config.run.avalanches or 0,
-        snapshot_times=(start_time or 0.0) + np.array(output.snapshots, dtype=float),
-    )
-    return kernel
+
+    def __init__(
+        self,
+        config: Config,
+        parameters: Parameters | Kernel,
+        *,
+        start_time: float | None = None,
+        end_time: float | None = None,
+        interval: float | None = None,
+        earlier_slips: int = 0,
+    ) -> None:
+        slider, output, stop = config.slider, config.output, config.run.stops
+        self._seed = config.run.seed
+        self._contacts = config.contact_kind.kernel_kind
+        self._parameters = parameters if isinstance(parameters, Kernel) else named(parameters)
+        self._slider = slider.kernel_kind, named(slider.kernel_parameters(config))
+        parts = config.drive_parts
+        forces = config.drive.start_forces(parts)
+        if start_time is not None:
+            parts = (DrivePart(start_time, 0.0, 0.0, -1), *parts)
+            forces = None if forces is None else (0.0, *forces)
+        durations, start_velocities, end_velocities, stages = (
+            np.array(numbers) for numbers in zip(*parts, strict=True)
+        )
+        ends = np.minimum(np.cumsum(durations), NEVER)
+        if end_time is not None:
+            ends[-1] = min(end_time, NEVER)
+        self._drive = ends, start_velocities, end_velocities, stages
+        self._forces = None if forces is None else np.array(forces)
+        self._stop: dict[str, Any] = {
+            "slips": stop.slips + earlier_slips if stop.slips else 0,
+            "displacement": stop.displacement or 0.0,
+            "block_distance": config.steady_block,
+            "blocks": stop.steady.blocks if stop.steady else 1,
+            "tolerance": stop.steady.tolerance * config.contacts.static_force
+            if stop.steady
+            else 0.0,
+        }
+        self._recorder: dict[str, Any] = {
+            "interval": interval or config.output_interval,
+            "slip_interval": config.slip_interval or 0.0,
+            "slip_velocity": slider.slip_velocity(config),
+            "quiet_time": slider.quiet_time,
+            "duration": float(ends[-1]),
+            "layers": slider.layers_recorded(config),
+        }
+        self._avalanches: dict[str, Any] = {
+            "min_size": float(output.avalanche_size or 1) * config.has_avalanches,
+            "snapshot_size": float(output.snapshot_size or 0),
+            "max_avalanches": config.run.avalanches or 0,
+            "snapshot_times": (start_time or 0.0) + np.array(output.snapshots, dtype=float),
+        }
+
+    def open(self, number: int = 0) -> Kernel:
+        """A kernel of a realization that can be started or restored."""
+        kernel = Kernel()
+        if isinstance(self._parameters, Kernel):
+            kernel.copy_contacts(self._parameters)
+        else:
+            kernel.set_contacts(self._contacts, self._parameters, self._seed, number)
+        kernel.set_slider(*self._slider)
+        kernel.set_drive(*self._drive)
+        if self._forces is not None:
+            kernel.set_drive_values(self._forces)
+        kernel.set_stop(**self._stop)
+        kernel.set_recorder(**self._recorder)
+        kernel.set_avalanches(**self._avalanches)
+        return kernel
+
+
+def tables_of(config: Config) -> tuple[str, ...]:
+    """Tables that a run of a configuration records; the others stay empty."""
+    slider, output = config.slider, config.output
+    has_slips = slider.slip_velocity(config) > 0
+    has_snapshots = bool(output.snapshots or output.snapshot_size)
+    recorded = {
+        "slips": has_slips,
+        "slip_trace": has_slips and bool(config.slip_interval),
+        "layers": slider.layers_recorded(config) > 0,
+        "avalanches": config.has_avalanches,
+        "snapshot_events": has_snapshots,
+        "snapshots": has_snapshots,
+    }
+    return tuple(table for table in TABLES if recorded.get(table, True))

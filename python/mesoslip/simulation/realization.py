@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import threading
 import time
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, Self
 
@@ -17,11 +18,11 @@ from mesoslip.configuration import arguments
 from mesoslip.configuration.config import Config
 from mesoslip.errors import RunError
 from mesoslip.simulation.kernel import Array, Kernel, Words
+from mesoslip.simulation.kernel_setup import KernelSetup, tables_of
 from mesoslip.simulation.memory import check_memory
 from mesoslip.simulation.recorded_tables import (
     CONTACT_COLUMNS,
     ENERGY_COLUMNS,
-    TABLES,
     Recorded,
     Rows,
 )
@@ -43,6 +44,10 @@ ENDINGS = {
 
 # Minimum scale of energy residuals, over the energy of all contacts about to break.
 MIN_ENERGY_RATIO = 1e-9
+
+# Terms of the energy balance before the first advance.
+NO_ENERGY = np.full(len(ENERGY_COLUMNS), np.nan)
+NO_ENERGY.flags.writeable = False
 
 # Wall time of a segment, after which progress and signals are checked [s]; work of the first one.
 SEGMENT_SECONDS = 0.25
@@ -180,10 +185,27 @@ class Realization(Recorded):
         self._after = after
         self._start = START
         self._energy: Array | None = None
+        self._recorded = tables_of(config)
+        self._setup: KernelSetup | None = None
         self._kernel: Kernel | None = None
         self._words: Words | None = None
         self._work = SEGMENT_WORK
         self._lock = threading.Lock()
+
+    @classmethod
+    def all_of(cls, config: Config, numbers: Iterable[int] | None = None) -> list[Realization]:
+        """All realizations of a configuration, or some of them, which share what they have in
+        common."""
+        numbers = range(config.run.realizations) if numbers is None else numbers
+        first = cls(config)
+        first._setup = first._start.setup(config, first._parameters)
+        return [first._sibling(number) for number in numbers]
+
+    def _sibling(self, number: int) -> Realization:
+        """Another realization, of which neither has started."""
+        other = object.__new__(type(self))
+        other.__dict__.update(self.__dict__, number=number, _tables={}, _lock=threading.Lock())
+        return other
 
     def _open(self) -> Kernel:
         """The kernel with its parts, started or restored."""
@@ -193,7 +215,9 @@ class Realization(Recorded):
             kernel, self._start = follow(self.config, self._parameters, self.number, self._after)
             self._after = None
         else:
-            kernel = self._start.configured_kernel(self.config, self._parameters, self.number)
+            if self._setup is None:
+                self._setup = self._start.setup(self.config, self._parameters)
+            kernel = self._setup.open(self.number)
             if self._words is not None:
                 kernel.restore(self._words)
                 self._words = None
@@ -316,11 +340,10 @@ class Realization(Recorded):
         """Take the recorded rows and the progress of the kernel."""
         progress = self._start.progress_since(kernel.ask())
         with self._lock:
-            for table in TABLES:
+            for table in self._recorded:
                 values = self._start.rows_since(table, kernel.drain(table))
-                if table not in self._tables:
-                    self._tables[table] = Rows(values.shape[1])
-                self._tables[table].add(values)
+                if len(values):
+                    self._tables.setdefault(table, Rows(values.shape[1])).add(values)
             self.time = progress.time
             self.breaks = progress.breaks
             if self.config.contact_kind.is_discrete:
@@ -379,7 +402,7 @@ class Realization(Recorded):
         if self._energy is not None:
             return self._energy
         if self._kernel is None:
-            return np.full(len(ENERGY_COLUMNS), np.nan)
+            return NO_ENERGY
         return self._start.energy_since(self._kernel.energy())
 
     @property

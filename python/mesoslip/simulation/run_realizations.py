@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from mesoslip.configuration.config import Config
 from mesoslip.errors import FileError, MesoslipError, RunError
-from mesoslip.execution.executors import Executor, ExecutorLike, as_executor, completed
+from mesoslip.execution.executors import Batches, Executor, ExecutorLike, as_executor, completed
 from mesoslip.execution.pool import PoolError, WorkerLostError
 from mesoslip.execution.stop import Stop, StopRequest
 from mesoslip.simulation.realization import Realization, Saved
@@ -84,9 +84,7 @@ class _Run:
         progress: Callable[[float], None] | None,
         checkpoint: Checkpoint | None,
     ) -> None:
-        self.realizations = [
-            Realization(config, number) for number in range(config.run.realizations)
-        ]
+        self.realizations = Realization.all_of(config)
         self._config = config
         self._executor = executor
         self._progress = progress
@@ -112,19 +110,28 @@ class _Run:
             self._compute_elsewhere(waiting, stop)
 
     def _compute_here(self, waiting: Sequence[Realization], stop: Stop) -> None:
-        work = completed(self._executor, self._advance, waiting, stop, poll=self._update)
+        batches = Batches(waiting)
+        work = completed(self._executor, self._advance_all, batches, stop, poll=self._update)
         with closing(work):
-            for realization, future in work:
+            for batch, future in work:
                 try:
-                    future.result()
+                    seconds = future.result()
                 except MemoryError:
                     raise RunError(NO_MEMORY) from None
-                self._done += realization.finished
-                self._under_way.discard(realization)
+                batches.finished(len(batch), seconds)
+                self._done += sum(one.finished for one in batch)
+                self._under_way.difference_update(batch)
                 self._update()
 
+    def _advance_all(self, batch: Sequence[Realization], stop: Stop) -> float:
+        """Advance realizations to their ends, on a thread; returns the time that it took [s]."""
+        start = time.perf_counter()
+        for one in batch:
+            self._advance(one, stop)
+        return time.perf_counter() - start
+
     def _advance(self, realization: Realization, stop: Stop) -> None:
-        """Advance a realization to its end, on a thread."""
+        """Advance a realization to its end."""
         self._under_way.add(realization)
         while not (realization.finished or stop.is_set()):
             realization.advance()
@@ -135,22 +142,28 @@ class _Run:
 
     def _compute_elsewhere(self, waiting: Sequence[Realization], stop: Stop) -> None:
         tables = self._config.to_dict()
-        pieces = ((tables, one.number) for one in waiting)
-        work = completed(self._executor, compute_realization, pieces, stop)
+        batches = Batches(one.number for one in waiting)
+        pieces = ((tables, numbers) for numbers in batches)
+        work = completed(self._executor, compute_realizations, pieces, stop)
         with closing(work):
-            for (_, number), future in work:
+            for (_, numbers), future in work:
                 try:
-                    saved, rows = future.result()
+                    seconds, results = future.result()
                 except MesoslipError:
                     raise
                 except Exception as error:
+                    named = f"realization {numbers[0]}"
+                    if len(numbers) > 1:
+                        named = f"realizations {numbers[0]} to {numbers[-1]}"
                     raise WorkerLostError(
-                        f"realization {number}: its worker failed: {type(error).__name__}: {error}"
+                        f"{named}: the worker failed: {type(error).__name__}: {error}"
                     ) from None
-                _restore(self.realizations[number], saved, rows)
-                self._done += 1
-                if self._checkpoint is not None:
-                    self._checkpoint.visit(self.realizations[number])
+                batches.finished(len(numbers), seconds)
+                for number, (saved, rows) in zip(numbers, results, strict=True):
+                    _restore(self.realizations[number], saved, rows)
+                    self._done += 1
+                    if self._checkpoint is not None:
+                        self._checkpoint.visit(self.realizations[number])
                 self._update()
 
     def _update(self) -> None:
@@ -161,21 +174,24 @@ class _Run:
             self._checkpoint.update(self.realizations)
 
 
-def compute_realization(
-    piece: tuple[dict[str, Any], int], stop: StopRequest
-) -> tuple[Saved, dict[str, NDArray[np.float64]]]:
-    """Run a realization, given by nested tables and its number, in another process.
+def compute_realizations(
+    piece: tuple[dict[str, Any], Sequence[int]], stop: StopRequest
+) -> tuple[float, list[tuple[Saved, dict[str, NDArray[np.float64]]]]]:
+    """Run realizations, given by nested tables and their numbers, in another process.
 
-    Returns its state at the end, and its tables.
+    Returns the time that it took [s]; the state of each at the end, and its tables.
     """
-    tables, number = piece
-    realization = Realization(Config.from_dict(tables), number)
-    try:
-        while not (realization.finished or stop.is_set()):
-            realization.advance()
-    finally:
-        realization.close()
-    return realization.save(), {name: rows.read() for name, rows in realization.waiting}
+    tables, numbers = piece
+    start, results = time.perf_counter(), []
+    for realization in Realization.all_of(Config.from_dict(tables), numbers):
+        try:
+            while not (realization.finished or stop.is_set()):
+                realization.advance()
+        finally:
+            realization.close()
+        rows = {name: rows.read() for name, rows in realization.waiting}
+        results.append((realization.save(), rows))
+    return time.perf_counter() - start, results
 
 
 def _restore(

@@ -14,7 +14,7 @@ import numpy as np
 from mesoslip.configuration.kernel_parameters import Parameters
 from mesoslip.simulation.archive import Archive
 from mesoslip.simulation.kernel import Array, Kernel, Progress, Words
-from mesoslip.simulation.kernel_setup import configured_kernel
+from mesoslip.simulation.kernel_setup import KernelSetup
 from mesoslip.simulation.recorded_tables import COLUMNS, ENERGY_COLUMNS
 
 if TYPE_CHECKING:
@@ -44,12 +44,10 @@ class Start:
     slips: int = 0
     energy: Array = field(default_factory=lambda: np.zeros(len(ENERGY_COLUMNS)))
 
-    def configured_kernel(self, config: Config, parameters: Parameters, number: int) -> Kernel:
-        """A kernel of the run, to be restored or, at time 0, started."""
+    def setup(self, config: Config, parameters: Parameters) -> KernelSetup:
+        """The parts of a kernel of the run, to be restored or, at time 0, started."""
         time = None if self.progress is None else self.progress.time
-        return configured_kernel(
-            config, parameters, number, start_time=time, earlier_slips=self.slips
-        )
+        return KernelSetup(config, parameters, start_time=time, earlier_slips=self.slips)
 
     def progress_since(self, now: Progress) -> Progress:
         """The progress of the run, from that of the kernel."""
@@ -102,13 +100,9 @@ def follow(config: Config, parameters: Parameters, number: int, end: End) -> tup
     archive = Archive(end.words)
     slider = archive.section_with("drive part")
     slips = int(archive.number("slips", "slip_count"))
-    kernel = configured_kernel(
-        config,
-        parameters,
-        number,
-        start_time=archive.number(slider, "time"),
-        earlier_slips=slips,
-    )
+    start_time = archive.number(slider, "time")
+    setup = KernelSetup(config, parameters, start_time=start_time, earlier_slips=slips)
+    kernel = setup.open(number)
     words = end.words
     if config.spring_stiffness != end.config.spring_stiffness:
         put_on_spring(archive, slider, end.config, config)

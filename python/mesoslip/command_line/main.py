@@ -28,6 +28,7 @@ from mesoslip.command_line import (
     report,
     response,
     run,
+    strokes,
     sweep,
     theory,
     trace,
@@ -50,6 +51,7 @@ COMMANDS = (
     catalogues.avalanches,
     catalogues.regime,
     response.response,
+    strokes.strokes,
     pictures.plot,
     report.report,
     export.export,
@@ -70,6 +72,7 @@ WITHOUT_XARRAY = {
     pictures.plot,
     report.report,
     response.response,
+    strokes.strokes,
 }
 
 # How to install the libraries that the kernels are linked to.

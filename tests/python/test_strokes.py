@@ -11,6 +11,7 @@ import tomli_w
 import xarray as xr
 from mesoslip.analysis.strokes import (
     find_slips_between_reversals,
+    friction_map,
     monotone_pieces,
     pieces_of_force,
     record_pieces,
@@ -19,6 +20,8 @@ from mesoslip.analysis.strokes import (
 )
 from mesoslip.analysis.strokes.cycles import overall
 from mesoslip.analysis.strokes.measure import Measured
+from mesoslip.reports.content import Subject
+from mesoslip.reports.sections.strokes import strokes as report_section
 from numpy.typing import NDArray
 from stroke_records import made
 
@@ -316,3 +319,36 @@ def test_one_direction_has_no_strokes() -> None:
         mesoslip.strokes(record_tree(time, np.ones(100)))
     with pytest.raises(mesoslip.ConfigError, match="middle"):
         mesoslip.strokes(record_tree(time, np.ones(100)), middle=80)
+
+
+def test_the_sign_of_a_column_of_friction_is_by_its_unit(tmp_path) -> None:  # type: ignore[no-untyped-def]
+    """Friction in micronewtons is a force, a position that turns is the drive's."""
+    x = drive("triangle", phases())
+    columns = [10 * phases(), np.full(x.size, 4e6), x, -1e6 * elastic_sliding(x)]
+    file = tmp_path / "rig.txt"
+    header = "Time [s]\tNormal [uN]\tPosition [mm]\tFriction [uN]"
+    np.savetxt(file, np.transpose(columns), delimiter="\t", header=header, comments="")
+    tree = mesoslip.read_trace(file)
+    assert {"spring_force", "normal_force", "drive_displacement"} <= set(tree.data_vars)
+    assert "as it goes back and forth" in tree.attrs["understood"]
+    found = mesoslip.strokes(tree)["cycles"]
+    np.testing.assert_allclose(found["mean_friction_coefficient"], 0.25, rtol=1e-6)
+
+
+def test_view_and_report_of_strokes() -> None:
+    """The picture has loops, strokes and two maps; the page has the tables."""
+    x = drive("sine", phases())
+    tree = record_tree(phases(), elastic_sliding(x), drive_displacement=x)
+    figure = mesoslip.plot(tree, view="strokes")
+    panels = [one for one in figure.axes if one.get_label() != "<colorbar>"]
+    assert len(panels) == 4
+    # Every loop is closed about the same area.
+    assert len(panels[0].lines) == 6
+    maps = [one.collections[0].get_array() for one in panels[2:]]
+    assert all(float(np.nanmax(one)) == pytest.approx(1.0) for one in maps)
+    strokes = friction_map(strokes_of(tree).records[0], strokes_of(tree).strokes[0], 1)
+    assert strokes.friction.shape[1] == 6
+    section = report_section([Subject("made", tree)])
+    assert section is not None
+    assert section.title == "Strokes"
+    assert report_section([Subject("made", record_tree(phases(), x + 2))]) is None

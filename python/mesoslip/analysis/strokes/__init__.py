@@ -8,6 +8,7 @@ from mesoslip.analysis.strokes.catalogue import (
     strokes_from,
     strokes_of,
 )
+from mesoslip.analysis.strokes.friction_map import FrictionMap, along, friction_map, place_of
 from mesoslip.analysis.strokes.segments import (
     Piece,
     back_and_forth,
@@ -20,15 +21,19 @@ from mesoslip.analysis.strokes.sliding import Sliding, sliding_of
 from mesoslip.analysis.strokes.slips import find_slips_between_reversals
 
 __all__ = [
+    "FrictionMap",
     "Piece",
     "Sliding",
     "Strokes",
+    "along",
     "back_and_forth",
     "check_middle",
     "find_slips_between_reversals",
+    "friction_map",
     "monotone_pieces",
     "output_pieces",
     "pieces_of_force",
+    "place_of",
     "record_pieces",
     "sliding_of",
     "strokes",

@@ -178,11 +178,16 @@ def _value(one: Any, name: str) -> float:
     return value.error if name.endswith("_error") else value.value
 
 
-def strokes_of(tree: Tree, middle: float = MIDDLE, name: str = "the output") -> Strokes:
-    """The strokes of all realizations of an output; ``middle`` is a share of a stroke."""
+def strokes_of(
+    tree: Tree,
+    middle: float = MIDDLE,
+    name: str = "the output",
+    realization: int | None = None,
+) -> Strokes:
+    """The strokes of all realizations of an output, or of one."""
     unit = apparatus_of(tree, name).force_unit
-    count = tree.sizes.get("realization", 1)
-    records = [record_of(tree, index, name) for index in range(count)]
+    chosen = range(tree.sizes.get("realization", 1)) if realization is None else [realization]
+    records = [record_of(tree, index, name) for index in chosen]
     found = [measure_all(record, middle) for record in records]
     if not any(found):
         raise FileError(f"{name}: has no whole stroke with enough samples in its middle")

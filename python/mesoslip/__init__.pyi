@@ -5,6 +5,7 @@ from .analysis.lyapunov import lyapunov
 from .analysis.regime import regime
 from .analysis.response import response
 from .analysis.slips import slips
+from .analysis.strokes import strokes
 from .api import run
 from .campaign.mean_field import mean_field
 from .campaign.sweep import sweep
@@ -66,6 +67,7 @@ __all__ = [
     "response",
     "run",
     "slips",
+    "strokes",
     "sweep",
     "track_strength",
     "write_table",

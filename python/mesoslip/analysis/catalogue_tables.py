@@ -1,22 +1,22 @@
-"""Tables of slips, avalanches and responses as files."""
+"""Tables of slips, avalanches, responses and strokes as files."""
 
 from __future__ import annotations
 
 import xarray as xr
 
-from mesoslip.analysis import avalanches, response, slips
+from mesoslip.analysis import avalanches, response, slips, strokes
 from mesoslip.configuration.reading import PathLike, as_path
 from mesoslip.errors import FileError
 from mesoslip.output.table_files import is_printed, write_printed
 
 
 def write_table(data: xr.Dataset | xr.DataTree, file: PathLike) -> None:
-    """Write what `slips`, `avalanches` or `response` returned as a table.
+    """Write what `slips`, `avalanches`, `response` or `strokes` returned as a table.
 
     Parameters
     ----------
     data
-        The catalogue, or the response.
+        The catalogue, the response, or the strokes.
     file
         The file: ``.tex`` for LaTeX with booktabs, ``.md`` for Markdown, each column in one unit;
         otherwise comma-separated values in SI units.
@@ -33,6 +33,12 @@ def write_table(data: xr.Dataset | xr.DataTree, file: PathLike) -> None:
             write_printed(response.tables(data), path)
         else:
             response.write_csv(data, path)
+    elif isinstance(data, xr.DataTree) and "cycles" in data.children:
+        found = strokes.strokes_from(data)
+        if for_print:
+            write_printed(found.tables, path)
+        else:
+            found.write_csv(path)
     elif isinstance(data, xr.Dataset) and "slip" in data.dims:
         catalogue = slips.catalogue_from(data)
         if for_print:
@@ -45,4 +51,6 @@ def write_table(data: xr.Dataset | xr.DataTree, file: PathLike) -> None:
         else:
             avalanches.write_csv(data, path)
     else:
-        raise FileError(f"{path}: is for what mesoslip.slips, avalanches or response returns")
+        raise FileError(
+            f"{path}: is for what mesoslip.slips, avalanches, response or strokes returns"
+        )

@@ -29,6 +29,7 @@ from mesoslip.command_line import (
     report,
     response,
     run,
+    strokes,
     sweep,
     theory,
     trace,
@@ -51,6 +52,7 @@ COMMANDS = (
     catalogues.avalanches,
     catalogues.regime,
     response.response,
+    strokes.strokes,
     pictures.plot,
     report.report,
     export.export,
@@ -71,6 +73,7 @@ WITHOUT_XARRAY = {
     pictures.plot,
     report.report,
     response.response,
+    strokes.strokes,
 }
 
 # How to install the libraries that the kernels are linked to.

@@ -222,6 +222,21 @@ def quantity_or_none(
     return None if text is None else quantity(text, option, unit, example, positive=positive)
 
 
+def share(text: str, option: str) -> float:
+    """The value of an option that is a share of a whole, such as "80%" or 0.8."""
+    from mesoslip.errors import ConfigError, Problem
+
+    number, mark, rest = text.strip().partition("%")
+    try:
+        value = float(number) / (100 if mark else 1)
+    except ValueError:
+        value = -1.0
+    if rest or not 0 < value <= 1:
+        message = "must be a share above 0 and up to 100 %, such as '80%'"
+        raise ConfigError([Problem("", option, message, text)])
+    return value
+
+
 def time_of(text: str, option: str) -> float:
     """The value of an option that is a time [s]."""
     return quantity(text, option, "s", "2 s")

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from mesoslip.analysis.strokes import monotone_pieces
 from mesoslip.configuration.columns import IGNORED
 from mesoslip.configuration.units import NUMBER, number_of, to_si
 from mesoslip.errors import ConfigError, FileError, Problem, shown
@@ -340,6 +341,8 @@ def _use_either(table: Table, index: int, heading: Heading, found: Assignment) -
         quantity, why = "displacement", "as the load point has a column of its own"
     elif "displacement" in found.used:
         quantity, why = "load_point", "as the slider has a column of its own"
+    elif monotone_pieces(table.values[index]) is not None:
+        quantity, why = "load_point", "as it goes back and forth"
     elif _moves_in_slips(table, index, found):
         quantity, why = "displacement", "as it moves ahead where the force falls"
     else:

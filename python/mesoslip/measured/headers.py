@@ -64,6 +64,14 @@ LIKE = {
 }
 MEANINGS = {name: quantity for quantity, names in NAMES.items() for name in names.split("|")}
 
+# Names whose quantity is that of their unit.
+BY_UNIT = {
+    "friction": ("force", "shear_stress"),
+    "shear": ("force", "shear_stress"),
+    "normal": ("normal_force", "normal_stress"),
+    "load": ("normal_force", "normal_stress"),
+}
+
 BRACKETS = re.compile(r"\[([^\]]*)\]|\(([^)]*)\)|\{([^}]*)\}|<([^>]*)>")
 
 
@@ -89,6 +97,12 @@ def meaning_of(name: str) -> str | None:
     """The quantity of a name; None if it is not known."""
     bare = name_of(name)
     return MEANINGS.get(bare) or MEANINGS.get(re.sub(r" ?\d$", "", bare) if bare[:-1] else "")
+
+
+def _by_unit(name: str, unit: str) -> str | None:
+    """The quantity of a name of which the unit says whether it is a force or a stress."""
+    known = BY_UNIT.get(name_of(name), ())
+    return next((one for one in known if _fits(unit, one)), None)
 
 
 def read_header(header: str, unit: str = "") -> Heading:
@@ -130,7 +144,8 @@ def _read(header: str, unit: str) -> Heading:
     text = header.strip(" \"'")
     unit = unit.strip("[](){}<> ")
     if unit:
-        return Heading(meaning_of(_without_brackets(text)) or meaning_of(text), unit)
+        quantity = _by_unit(text, unit) or meaning_of(_without_brackets(text)) or meaning_of(text)
+        return Heading(quantity, unit)
     # Either a force in newtons, or a normal force without a unit.
     if re.fullmatch(r"(?i)f_?n", text):
         return Heading(None, None)
@@ -145,7 +160,7 @@ def _read(header: str, unit: str) -> Heading:
             "friction", None, f"{text!r} taken as force over normal force, not as newtons"
         )
     for name, named in _divided(text):
-        quantity = meaning_of(name)
+        quantity = _by_unit(name, named) or meaning_of(name)
         if quantity is not None and (named == "" or _fits(named, quantity)):
             return Heading(quantity, named or None)
     for name, named in _divided(text):

@@ -1,5 +1,14 @@
-"""Strokes of a record that goes back and forth: pieces between its reversals, slips in them."""
+"""Strokes of a record that goes back and forth: pieces between its reversals, slips in them, and
+what is measured of strokes and cycles."""
 
+from mesoslip.analysis.strokes.catalogue import (
+    Strokes,
+    check_middle,
+    strokes,
+    strokes_from,
+    strokes_of,
+)
+from mesoslip.analysis.strokes.friction_map import FrictionMap, along, friction_map, place_of
 from mesoslip.analysis.strokes.segments import (
     Piece,
     back_and_forth,
@@ -12,13 +21,22 @@ from mesoslip.analysis.strokes.sliding import Sliding, sliding_of
 from mesoslip.analysis.strokes.slips import find_slips_between_reversals
 
 __all__ = [
+    "FrictionMap",
     "Piece",
     "Sliding",
+    "Strokes",
+    "along",
     "back_and_forth",
+    "check_middle",
     "find_slips_between_reversals",
+    "friction_map",
     "monotone_pieces",
     "output_pieces",
     "pieces_of_force",
+    "place_of",
     "record_pieces",
     "sliding_of",
+    "strokes",
+    "strokes_from",
+    "strokes_of",
 ]

@@ -37,6 +37,8 @@ REST = 0.002
 # The force without a displacement: quantiles that are its levels, minimum ratio of the smaller to
 # the larger, and part of the distance from their middle to them that a change of sign exceeds.
 LEVELS, MIN_RATIO, BEYOND = (0.1, 0.9), 0.1, 0.5
+# Limits of the time in which the force leaves its level, over that at its rate after it.
+TIMES = (2.2, 0.5)
 # Maximum ratio of the times of rises and falls, minimum share of the time at the levels, and
 # minimum number of changes of the sign.
 MAX_ASYMMETRY, MIN_SHARE, MIN_CHANGES = 4.0, 0.45, 4
@@ -158,12 +160,14 @@ def pieces_of_force(time: Array, force: Array) -> tuple[Piece, ...] | None:
     rise, fall = float(np.median(took[rising])), float(np.median(took[~rising]))
     if not 1 / MAX_ASYMMETRY <= rise / fall <= MAX_ASYMMETRY:
         return None
-    # The force begins to change its sign at the extreme before it is beyond the level.
+    noise = 3 * noise_level(force)
+    # The force leaves its level as long before as it would take at this rate.
     bounds: list[int] = []
-    for number, (one, two) in enumerate(zip(last.tolist(), next_one.tolist(), strict=True)):
-        start = max(bounds[-1] + 1 if bounds else 0, one - (two - one))
-        before = side[one] * force[start : one + 1]
-        bounds.append(start + int(np.argmax(before)) if number or start else one)
+    for one, two in zip(last.tolist(), next_one.tolist(), strict=True):
+        rest = (1 - BEYOND) / (2 * BEYOND) * (two - one)
+        start, end = (max(0, one - round(share * rest)) for share in TIMES)
+        part = side[one] * force[start : end + 1]
+        bounds.append(start + int(np.flatnonzero(part >= part.max() - noise)[-1]))
     ends = [0, *bounds, force.size]
     first = int(side[last[0]])
     return tuple(

@@ -55,6 +55,8 @@ def find_slips_between_reversals(
     )  # fmt: skip
     found = find_slips(time[samples], unfolded, noise=noise, **options)
     end = np.array([one.after for one in pieces])[piece[found.first]] - END
+    # A fall up to the end of a piece, or nearly so, is that of a reversal that was found late.
+    end -= (samples[found.last] - samples[found.first]) // 2
     kept = (piece[found.first] == piece[found.last]) & (samples[found.last] < end)
     first, last = found.first[kept], found.last[kept]
     shift = sliding.force - unfolded

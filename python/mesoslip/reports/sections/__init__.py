@@ -20,6 +20,7 @@ from mesoslip.reports.sections.provenance import provenance
 from mesoslip.reports.sections.regime import regime
 from mesoslip.reports.sections.response import response
 from mesoslip.reports.sections.slips import slips
+from mesoslip.reports.sections.strokes import strokes
 from mesoslip.reports.sections.sweep import maps, sweep
 from mesoslip.reports.sections.theory import curve, cycle, lyapunov, onset
 
@@ -35,6 +36,7 @@ SECTIONS: dict[str, tuple[Writer, ...]] = dict.fromkeys(KINDS, _with()) | {
         regime,
         pictures,
         slips,
+        strokes,
         avalanches,
         response,
         energy,

@@ -1,0 +1,314 @@
+"""The strokes and cycles of an output: as a tree, as tables, and over all cycles."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mesoslip.analysis.apparatus import apparatus_of
+from mesoslip.analysis.strokes.cycles import Cycle, Overall, cycles_of, overall
+from mesoslip.analysis.strokes.measure import MIDDLE, Measured, Stroke, measure_all
+from mesoslip.analysis.strokes.record import StrokeRecord, record_of
+from mesoslip.analysis.strokes.variables import CYCLES, STROKES, unit_of
+from mesoslip.errors import ConfigError, FileError, Problem
+from mesoslip.output.arrays import Tree
+from mesoslip.output.inputs import OutputLike, opened_run_arrays
+from mesoslip.output.table_files import PrintedTable
+from mesoslip.output.targets import written_whole
+from mesoslip.output.variables import Group
+from mesoslip.quantities import column, with_error
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Array = NDArray[np.float64]
+
+# Printed columns: header, and SI unit.
+STROKE_HEADS = {
+    "stroke_number": ("stroke", "1"),
+    "start_time": ("start", "s"),
+    "direction": ("direction", "1"),
+    "length": ("length", "m"),
+    "velocity": ("velocity", "m/s"),
+    "mean_friction": ("mean friction", "N"),
+    "mean_friction_coefficient": ("coefficient", "1"),
+    "max_friction": ("maximum", "N"),
+    "max_friction_position": ("at", "m"),
+    "stiffness": ("stiffness", "N/m"),
+}
+CYCLE_HEADS = {
+    "cycle_number": ("cycle", "1"),
+    "start_time": ("start", "s"),
+    "mean_friction": ("mean friction", "N"),
+    "mean_friction_coefficient": ("coefficient", "1"),
+    "loop_energy": ("loop energy", "J"),
+    "offset": ("offset", "N"),
+    "stiffness": ("stiffness", "N/m"),
+}
+# Quantities over all cycles.
+OVERALL = ("mean_friction", "mean_friction_coefficient", "loop_energy", "offset", "stiffness")
+# Units for print where the force is a coefficient.
+COEFFICIENTS = {"N": "1", "N/m": "1/m", "J": "m"}
+# Significant digits of columns without errors.
+DIGITS = 4
+
+
+@dataclass(frozen=True)
+class Strokes:
+    """The strokes and cycles of an output."""
+
+    columns: Mapping[str, Mapping[str, NDArray[Any]]]
+    """Columns in SI, each of shape (rows,), of the groups ``strokes`` and ``cycles``."""
+    overall: Mapping[str, Overall]
+    """Quantities over all cycles of the first realization."""
+    middle: float
+    force_unit: str
+    source: str
+    """The quantity in which strokes were found."""
+    notes: Sequence[str]
+    """Sentences on what was found, with guesses."""
+    records: Sequence[StrokeRecord] = ()
+    strokes: Sequence[Sequence[Stroke]] = ()
+    """Records and strokes by realization."""
+
+    def rows(self, group: str) -> list[dict[str, Any]]:
+        """A dictionary for each stroke or cycle; None for unknown values."""
+        columns = self.columns[group]
+        lists = [column.tolist() for column in columns.values()]
+        return [
+            {
+                name: None if value != value else value
+                for name, value in zip(columns, row, strict=True)
+            }
+            for row in zip(*lists, strict=True)
+        ]
+
+    @property
+    def tables(self) -> list[PrintedTable]:
+        """Strokes, cycles, and the means over cycles, for print."""
+        tables = [
+            self._table("Strokes", "strokes", STROKE_HEADS),
+            self._table("Cycles", "cycles", CYCLE_HEADS),
+        ]
+        if self.overall:
+            rows = []
+            for name, one in self.overall.items():
+                head, unit = CYCLE_HEADS[name]
+                unit = self._unit(unit)
+                rows.append(
+                    (
+                        head,
+                        with_error(one.mean, one.error, unit),
+                        with_error(one.drift, one.drift_error, unit),
+                        str(one.running_in),
+                        str(one.cycles),
+                    )
+                )
+            heads = ("", "mean", "drift per cycle", "running-in", "cycles")
+            tables.append(PrintedTable("Means over cycles", heads, tuple(rows)))
+        return tables
+
+    def _unit(self, unit: str) -> str:
+        return COEFFICIENTS.get(unit, unit) if self.force_unit == "1" else unit
+
+    def _table(self, title: str, group: str, heads: Mapping[str, tuple[str, str]]) -> PrintedTable:
+        columns = self.columns[group]
+        cells = []
+        if columns["realization_index"].any():
+            cells.append(("realization", *map(str, columns["realization_index"].tolist())))
+        for name, (head, unit) in heads.items():
+            values = columns[name].astype(float)
+            if values.size and not np.isfinite(values).any():
+                continue
+            if columns[name].dtype.kind == "i":
+                cells.append(
+                    (
+                        head,
+                        *(f"{one:+.0f}" if name == "direction" else f"{one:.0f}" for one in values),
+                    )
+                )
+                continue
+            shown = column(values.tolist(), self._unit(unit), 7 if name == "start_time" else DIGITS)
+            errors = columns.get(f"{name}_error", np.full(values.size, np.nan))
+            texts = map(shown.text, values.tolist(), errors.tolist())
+            cells.append((shown.head(head), *texts))
+        names, *rows = zip(*cells, strict=True)
+        return PrintedTable(title, names, tuple(rows))
+
+    def write_csv(self, path: Path) -> None:
+        """Write strokes and cycles as two tables, with an empty line between them."""
+        with written_whole(path) as part, part.open("w", newline="", encoding="utf-8") as file:
+            for number, (group, meanings) in enumerate((("strokes", STROKES), ("cycles", CYCLES))):
+                file.write("\n" if number else "")
+                writer = csv.DictWriter(file, list(meanings))
+                units = {
+                    name: unit_of(one.units, self.force_unit) for name, one in meanings.items()
+                }
+                writer.writerow({name: f"{name} [{unit}]" for name, unit in units.items()})
+                writer.writerows(self.rows(group))
+
+    def to_json(self) -> dict[str, Any]:
+        """Everything as nested lists and numbers."""
+        found = {
+            name: {key: getattr(one, key) for key in one.__dataclass_fields__}
+            for name, one in self.overall.items()
+        }
+        return {
+            "source": self.source,
+            "force_unit": self.force_unit,
+            "middle": self.middle,
+            "notes": self.notes,
+            "strokes": self.rows("strokes"),
+            "cycles": self.rows("cycles"),
+            "overall": found,
+        }
+
+
+def _value(one: Any, name: str) -> float:
+    """A value or an error of a stroke or a cycle."""
+    value = getattr(one, name.removesuffix("_error"))
+    if not isinstance(value, Measured):
+        return float(value)
+    return value.error if name.endswith("_error") else value.value
+
+
+def strokes_of(
+    tree: Tree,
+    middle: float = MIDDLE,
+    name: str = "the output",
+    realization: int | None = None,
+) -> Strokes:
+    """The strokes of all realizations of an output, or of one."""
+    unit = apparatus_of(tree, name).force_unit
+    chosen = range(tree.sizes.get("realization", 1)) if realization is None else [realization]
+    records = [record_of(tree, index, name) for index in chosen]
+    found = [measure_all(record, middle) for record in records]
+    if not any(found):
+        raise FileError(f"{name}: has no whole stroke with enough samples in its middle")
+    cycles = [cycles_of(record, own) for record, own in zip(records, found, strict=True)]
+    means = {key: overall([getattr(one, key) for one in cycles[0]]) for key in OVERALL}
+    return Strokes(
+        {"strokes": _columns(STROKES, found), "cycles": _columns(CYCLES, cycles)},
+        {key: one for key, one in means.items() if one is not None},
+        middle,
+        unit,
+        records[0].source,
+        tuple(_notes(records[0], found)),
+        records,
+        found,
+    )
+
+
+def _notes(record: StrokeRecord, strokes: Sequence[Sequence[Stroke]]) -> Iterator[str]:
+    """Sentences on what was found, with guesses."""
+    yield (
+        f"strokes by the {record.source}: {len(strokes[0])} whole ones; those at either end of the "
+        "record are left out"
+    )
+    yield from record.notes
+    count = sum(not one.slides for own in strokes for one in own)
+    if count:
+        what = (
+            "friction is unknown without a displacement"
+            if record.position is None
+            else "the mean is that of the middle, with the reversal"
+        )
+        yield f"in {count} strokes the force grows up to the end, as with partial slip: {what}"
+
+
+def _columns(
+    meanings: Group, per_realization: Sequence[Sequence[Stroke]] | Sequence[Sequence[Cycle]]
+) -> dict[str, NDArray[Any]]:
+    """The columns of strokes or of cycles, shape (rows,), in SI."""
+    rows = [
+        {"realization_index": index, "stroke_number": place, "cycle_number": place, "": one}
+        for index, own in enumerate(per_realization)
+        for place, one in enumerate(own, 1)
+    ]
+    return {
+        name: np.array(
+            [row[name] if name in row else _value(row[""], name) for row in rows],
+            dtype=meaning.dtype,
+        )
+        for name, meaning in meanings.items()
+    }
+
+
+def strokes_from(tree: xr.DataTree) -> Strokes:
+    """The strokes that `strokes` returned, without means over cycles."""
+    columns = {
+        group: {str(name): one.values for name, one in tree[group].data_vars.items()}
+        for group in ("strokes", "cycles")
+    }
+    unit = tree["strokes"]["mean_friction"].attrs["units"]
+    notes = str(tree.attrs["notes"]).splitlines()
+    return Strokes(columns, {}, tree.attrs["middle"], unit, tree.attrs["source"], notes)
+
+
+def strokes(output: OutputLike, *, middle: float = MIDDLE) -> xr.DataTree:
+    """The strokes of a record that goes back and forth.
+
+    Parts of strokes at either end of the record are left out.
+
+    Parameters
+    ----------
+    output
+        Output of a run, or a measured trace.
+    middle
+        Share of the length of a stroke over which friction is averaged; of the time of a stroke
+        where no displacement is known. If the reversal reaches into the middle, it is left out as a
+        transient.
+
+    Returns
+    -------
+    xarray.DataTree
+        Group ``strokes``, dimension ``stroke``: times, ``direction`` (+1 or -1), ``length``,
+        ``velocity``, ``mean_friction`` along the motion with its standard error, which knows that
+        samples are correlated, the coefficient where the normal force is known, ``max_friction``
+        and its distance from the reversal, the forces at the reversals, and the ``stiffness`` of
+        the reversal. Group ``cycles``, dimension ``cycle``: ``loop_energy``, ``offset`` (half the
+        sum of the mean forces in both directions), and means. SI; of a measured friction
+        coefficient forces have the unit 1. Attributes: ``source``, the quantity in which strokes
+        were found, and ``notes``.
+
+    Raises
+    ------
+    FileError
+        If the output cannot be read, or does not go back and forth.
+    ConfigError
+        If the share is not between 0 and 1.
+    """
+    import xarray as xr
+
+    check_middle("middle", middle)
+    with opened_run_arrays(output) as tree:
+        found = strokes_of(tree, middle)
+    groups: dict[str, xr.Dataset] = {}
+    for group, meanings, dimension in (("strokes", STROKES, "stroke"), ("cycles", CYCLES, "cycle")):
+        variables = {
+            name: meanings.variable(name, (dimension,), values)
+            for name, values in found.columns[group].items()
+        }
+        for one in variables.values():
+            one.attrs["units"] = unit_of(one.attrs["units"], found.force_unit)
+        groups[group] = xr.Dataset(variables)
+    attributes = {
+        "source": found.source,
+        "middle": middle,
+        "notes": "\n".join(found.notes),
+    }
+    result = xr.DataTree.from_dict(groups)
+    result.attrs.update(attributes)
+    return result
+
+
+def check_middle(key: str, middle: float) -> None:
+    """Check that the middle is a share of a stroke."""
+    if not 0 < middle <= 1:
+        raise ConfigError([Problem("", key, "must be between 0 and 100 %", middle)])

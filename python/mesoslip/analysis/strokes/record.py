@@ -1,0 +1,122 @@
+"""A record that goes back and forth: samples, pieces, and the noise of its quantities."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mesoslip.analysis.noise import noise_level, without_impulses
+from mesoslip.analysis.strokes.segments import FORCE, Piece, output_pieces
+from mesoslip.analysis.strokes.sliding import polarity
+from mesoslip.errors import FileError
+from mesoslip.output.access import group_of
+from mesoslip.output.arrays import Tree
+from mesoslip.output.variables import FORCES
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class StrokeRecord:
+    """Samples of a realization, arrays of shape (samples,)."""
+
+    time: Array
+    force: Array
+    position: Array | None
+    """Displacement in which the strokes were found [m]; None if they are those of the force."""
+    normal: Array | None
+    """Normal force [N], positive."""
+    pieces: tuple[Piece, ...]
+    source: str
+    """The quantity in which they were found."""
+    white: float
+    """Standard deviation of the white noise of the force."""
+    correlated: float
+    """That of noise that is correlated from sample to sample."""
+    correlation_time: float
+
+    @cached_property
+    def sign(self) -> float:
+        """+1 if the force is positive along the motion, -1 if it is against it."""
+        return polarity(self.force, self.pieces)
+
+    @cached_property
+    def position_noise(self) -> float:
+        """Standard deviation of the noise of the position [m]."""
+        return 0.0 if self.position is None else noise_level(self.position)
+
+    @cached_property
+    def variance_ratio(self) -> float:
+        """Variance of a sum over many samples of noise, over that of white noise."""
+        if self.correlated == 0:
+            return 1.0
+        interval = float(np.median(np.diff(self.time)))
+        length = 1 / math.tanh(interval / (2 * self.correlation_time))
+        total = self.white**2 + self.correlated**2
+        return (self.white**2 + self.correlated**2 * length) / total
+
+    @property
+    def noise(self) -> float:
+        """Standard deviation of all noise of the force."""
+        return math.hypot(self.white, self.correlated)
+
+    @property
+    def notes(self) -> list[str]:
+        """Guesses about the record, which may be wrong."""
+        found = []
+        if self.source == FORCE:
+            found.append(
+                "guess: strokes are those of the sign of the force, as no displacement is known"
+            )
+        elif self.sign < 0:
+            found.append("guess: the force is against the motion, as of the drive on the sensor")
+        return found
+
+
+def record_of(tree: Tree, realization: int = 0, name: str = "the output") -> StrokeRecord:
+    """A realization of an output as a record of strokes."""
+    pieces, source = output_pieces(tree, realization)
+    root = tree.to_dataset()
+    if pieces is None:
+        raise FileError(
+            f"{name}: does not go back and forth: the {source} has no reversals"
+            if source != FORCE
+            else f"{name}: does not go back and forth, as far as the sign of the force shows; no "
+            "displacement is known"
+        )
+    force = root[next(one for one in FORCES if one in root)].values[realization].astype(float)
+    known = np.flatnonzero(np.isfinite(force))
+    count = int(known[-1]) + 1
+    time, force = root["time"].values[:count], force[:count]
+    white, correlated, correlation_time = noise_level(force), 0.0, 0.0
+    if "noise" in tree.children:
+        noise = group_of(tree, "noise")
+        force = without_impulses(time, force, noise["impulse_time"].values)
+        white, correlated, correlation_time = (
+            float(noise[one].values)
+            for one in ("deviation", "correlated_deviation", "correlation_time")
+        )
+    position = None
+    if source != FORCE:
+        name = "drive_displacement" if source == "load point" else "displacement"
+        position = _whole(time, root[name].values[realization][:count])
+    normal = None
+    if "normal_force" in root and "spring_force" in root:
+        normal = np.abs(
+            _whole(time, np.atleast_2d(root["normal_force"].values)[realization][:count])
+        )
+    kept = tuple(one._replace(after=min(one.after, count)) for one in pieces if one.first < count)
+    return StrokeRecord(
+        time, force, position, normal, kept, source, white, correlated, correlation_time
+    )
+
+
+def _whole(time: Array, values: Array) -> Array:
+    """Values with lines over missing samples."""
+    known = np.isfinite(values)
+    whole: Array = np.interp(time, time[known], values[known].astype(float))
+    return whole

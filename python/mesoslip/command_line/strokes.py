@@ -1,0 +1,61 @@
+"""``mesoslip strokes``."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from mesoslip.command_line.options import (
+    JsonOption,
+    OutputArgument,
+    TableOption,
+    print_json,
+    print_table,
+    share,
+    write_table,
+)
+
+# Rows of a table that are printed.
+MAX_ROWS = 20
+
+
+def strokes(
+    output: OutputArgument,
+    table: TableOption = None,
+    as_json: JsonOption = False,
+    as_latex: Annotated[
+        bool, typer.Option("--latex", help="Print the means over cycles as a LaTeX table")
+    ] = False,
+    middle: Annotated[
+        str,
+        typer.Option(
+            help="Share of a stroke over which friction is averaged, in its middle",
+            metavar="SHARE",
+        ),
+    ] = "80%",
+) -> None:
+    """Print strokes and cycles of a record that goes back and forth: friction, loops, stiffness."""
+    from mesoslip.analysis import strokes as analysis
+    from mesoslip.output import files, targets
+    from mesoslip.output.table_files import latex
+
+    part = share(middle, "--middle")
+    if table is not None:
+        targets.check_writable(table, [output])
+    with files.opened_arrays(output) as tree:
+        found = analysis.strokes_of(tree, part, str(output))
+    write_table(table, lambda: found.tables, found.write_csv)
+    if as_json:
+        print_json(found.to_json())
+        return
+    if as_latex:
+        typer.echo(latex(found.tables[-1]))
+        return
+    for note in found.notes:
+        typer.echo(note)
+    for one in found.tables:
+        typer.echo(f"\n{one.title}")
+        print_table((one.head, *one.rows[:MAX_ROWS]))
+        if len(one.rows) > MAX_ROWS:
+            typer.echo(f"the first {MAX_ROWS} of {len(one.rows)}; all with --csv FILE")

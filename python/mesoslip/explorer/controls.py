@@ -9,9 +9,11 @@ from dataclasses import dataclass, field
 from mesoslip.configuration.config import Config
 from mesoslip.configuration.contacts.tables import (
     BOLTZMANN,
+    CORRELATIONS,
     COUPLINGS,
     INITIAL_STATES,
     LATTICES,
+    RENEWALS,
 )
 from mesoslip.configuration.differences import flat
 from mesoslip.configuration.keys import key_kind
@@ -32,6 +34,7 @@ GROUPS = {
     "contacts.threshold": "Thresholds",
     "contacts.ageing": "Ageing",
     "contacts.thermal": "Temperature",
+    "contacts.track": "Track",
     "interaction": "Interaction",
 }
 # Threshold laws that need no more than a width.
@@ -166,6 +169,13 @@ ACTIVATION_RATIO = 0.04
 ROOM_TEMPERATURE = 300.0
 
 
+def derived_value(key: str, config: Config) -> str:
+    """Value of a key that a switch needs and that follows from the others."""
+    if key == "contacts.track.length":
+        return f"{config.contacts.break_stretch}"
+    return activation_length(config)
+
+
 def activation_length(config: Config) -> str:
     """The activation length with which f_T/f_s is `ACTIVATION_RATIO` at room temperature."""
     force = ACTIVATION_RATIO * config.contacts.contact_static_force
@@ -205,6 +215,7 @@ CONTROLS = (
     Control("contacts.drag", "drag Nmη", 5, usual=1e-4),
     Control("contacts.coupling", "coupling", choices=RULES),
     Control("contacts.initial", "at the start", choices=tuple(INITIAL_STATES)),
+    Control("contacts.renewal", "thresholds of later lives", choices=tuple(RENEWALS)),
     Control("contacts.threshold.law", "law", choices=WIDTH_LAWS),
     Control("contacts.threshold.relative_width", "width Δf_s/f_s", 2, (1e-3, 1), 0.01),
     Control(
@@ -259,6 +270,18 @@ CONTROLS = (
     Control("contacts.thermal.force_ratio", "force f_T/f_s", 1.5, (1e-3, 1), ACTIVATION_RATIO),
     Control("contacts.thermal.temperature", "temperature T", 1, usual=ROOM_TEMPERATURE),
     Control("contacts.thermal.activation_length", "activation length x_a", 1.5, usual=1e-10),
+    Control(
+        "contacts.track",
+        "strength along the track",
+        choices=(NONE, "spread"),
+        choice_labels={NONE: "uniform", "spread": "varies"},
+        # The length is the breaking stretch, see `derived_value`.
+        required={"spread": {"contacts.track.spread": "0.1", "contacts.track.length": ""}},
+        is_switch=True,
+    ),
+    Control("contacts.track.spread", "spread w", range=(0.01, 0.5)),
+    Control("contacts.track.length", "correlation length l", 1.5, usual=1e-7),
+    Control("contacts.track.correlation", "correlation", choices=tuple(CORRELATIONS)),
     Control(
         "interaction.lattice",
         "lattice",

@@ -17,7 +17,7 @@ from mesoslip.explorer.controls import (
     SWITCHES,
     TABLE_CONTROLS,
     Control,
-    activation_length,
+    derived_value,
     lattice_size,
     values,
 )
@@ -146,7 +146,7 @@ class Session:
             elif not one.startswith(table):
                 self.changes[one] = needed[text][one]
             elif not is_there:
-                self.changes[one] = needed[text][one] or activation_length(self.config)
+                self.changes[one] = needed[text][one] or derived_value(one, self.config)
 
     def _needed_by_others(self, table: str) -> set[str]:
         """Keys that the choices of other tables require now."""

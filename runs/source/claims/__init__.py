@@ -1,4 +1,4 @@
-"""The source's claims C1 to C24, each judged from outputs of runs.
+"""The source's claims C1 to C24, and others from C25 on, each judged from outputs of runs.
 
 Adding one is a function in a module of this folder, and its runs in this folder; sweeps that a
 claim needs are in the folder ``sweeps``.

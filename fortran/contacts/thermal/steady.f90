@@ -165,8 +165,8 @@ contains
 
       stretch = pose%displacement - self%record(row_origin, contact)
       ! To the last digit as in a schedule.
-      if (.not. (allocated(self%births%force) .or. self%parameters%keeps_thresholds)) &
-         & stretch = pose%direction &
+      if (.not. (allocated(self%births%force) .or. self%parameters%keeps_thresholds &
+         & .or. self%touches)) stretch = pose%direction &
          & * self%parameters%back_force_ratio * self%parameters%static_force &
          & / self%record(row_stiffness, contact)
       self%life(life_clock, contact) = merge(1.0_wp, 2.0_wp, self%direction > 0.0_wp)

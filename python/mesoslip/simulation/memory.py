@@ -47,11 +47,12 @@ def check_memory(config: Config, available: float | None = None) -> None:
     per_sample = BYTES_PER_SAMPLE + BYTES_PER_LAYER * config.slider.layers_recorded(config)
     fine = config.slip_interval
     finer = 0.0 if fine is None else config.slider.time_in_slips(config) / fine
-    lattices = BYTES_PER_CONTACT_IN_SNAPSHOT * contacts.count * run.realizations
+    sites = config.contact_kind.site_count(contacts)
+    lattices = BYTES_PER_CONTACT_IN_SNAPSHOT * sites * run.realizations
     after = 0.0 if output.snapshot_size is None else _breaks(config) / output.snapshot_size
     problems = []
     samples = config.expected_duration / config.output_interval
-    contact_bytes = config.contact_kind.bytes_per_contact * contacts.count * together
+    contact_bytes = config.contact_kind.bytes_per_contact * sites * together
     for key, needed, value in (
         ("contacts.count", contact_bytes, contacts.count),
         ("run.avalanches", BYTES_PER_AVALANCHE * in_catalogue * run.realizations, run.avalanches),

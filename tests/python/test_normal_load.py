@@ -342,3 +342,49 @@ def test_theory_is_that_of_the_reference_load():
     assert contact_theory(plain).caveat == ""
     assert contact_theory(loaded).caveat == "computed at the constant normal force 2 N"
     assert mesoslip.derived(loaded)["F_steady"] == mesoslip.derived(plain)["F_steady"]
+
+
+@pytest.fixture(scope="module")
+def steps_up_and_down():
+    """A run with a step of the load up and one down, without noise."""
+    # Long enough for the force after the step to settle.
+    stages = [{"duration": 2e4, "normal_force": one} for one in (1.0, 1.5, 1.0)]
+    config = sliding({"normal_force": 1.0, "stage": stages}, 6e4, "me")
+    return mesoslip.run(config.replace({"output.interval": 10.0}))
+
+
+def test_the_response_to_a_step_is_direct_or_transient(steps_up_and_down, relaxed):
+    """Up: all of it after sliding, with alpha = mu (1 - L/L')/ln(L'/L). Down: all of it at once."""
+    found = mesoslip.response(steps_up_and_down, fit=False)["load_steps"].to_dataset()
+    assert found["load_step_time"].values == pytest.approx([2e4, 4e4], abs=20)
+    assert found["normal_force_after"].values == pytest.approx([1.5, 1.0])
+    # Just after is the first sample, up to 10 s or a hundredth of a breaking stretch after.
+    assert found["direct_change"].values == pytest.approx([0, -0.5 * STEADY], abs=0.01)
+    assert found["transient_change"].values == pytest.approx([0.5 * STEADY, 0], abs=0.01)
+    alpha = STEADY / 3 / math.log(1.5)
+    assert found["alpha"].values == pytest.approx([alpha, 0], abs=1e-2)
+    rise = found["rise_displacement"].values
+    assert relaxed(rise[0]) == pytest.approx(STEADY, abs=0.02)
+    assert np.isnan(rise[1])
+
+
+def test_the_response_of_a_measured_trace_has_steps_of_its_normal_force(
+    steps_up_and_down, tmp_path
+):
+    root = steps_up_and_down.to_dataset()
+    columns = ("time", "spring_force", "normal_force", "drive_displacement")
+    values = np.array([np.ravel(root[name].values) for name in columns]).T
+    noise = np.random.default_rng(1).normal(0, 1e-3, (len(values), 2))
+    values[:, 1:3] += noise
+    path = tmp_path / "trace.csv"
+    header = "time [s],force [N],normal force [N],load point [m]"
+    np.savetxt(path, values, delimiter=",", header=header, comments="")
+    found = mesoslip.response(mesoslip.read_trace(path), fit=False)["load_steps"].to_dataset()
+    assert found["normal_force_after"].values == pytest.approx([1.5, 1.0], abs=1e-3)
+    assert found["alpha"].values == pytest.approx([STEADY / 3 / math.log(1.5), 0], abs=0.02)
+
+
+def test_a_vibrating_load_has_no_steps():
+    load = {"normal_force": 1.0, "cycle": {"amplitude": 0.4, "frequency": 1e-3}}
+    tree = mesoslip.run(sliding(load, 3000.0, count=500))
+    assert mesoslip.response(tree, fit=False)["load_steps"].sizes["load_step"] == 0

@@ -43,7 +43,7 @@ def configuration_page() -> str:
 def _tables() -> Iterator[tuple[str, type[Table]]]:
     """Each table with its name in a file, those of a kind of slider one after another."""
     yield "At the top", Config
-    for name, field in Config.model_fields.items():
+    for name, field in Config.fields().items():
         if name == "slider":
             for kind, table in SLIDERS.items():
                 yield f'[slider] with kind = "{kind}"', table
@@ -57,7 +57,7 @@ def _tables() -> Iterator[tuple[str, type[Table]]]:
 
 
 def _inner(outer: str, table: type[Table]) -> Iterator[tuple[str, type[Table]]]:
-    for name, field in table.model_fields.items():
+    for name, field in table.fields().items():
         for inner in tables_in(field.annotation):
             place = f"{outer}.{name}"
             yield f"[[{place}]]" if get_origin(_bare(field)) is tuple else f"[{place}]", inner

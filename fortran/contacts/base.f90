@@ -8,13 +8,14 @@ module mesoslip_contacts_base
    use mesoslip_numerics_archive, only: archive_type
    use mesoslip_numerics_errors, only: error_type, raise, status_invalid
    use mesoslip_numerics_parameters, only: name_length, parameters_type
+   use mesoslip_normal_load, only: normal_load_type, take_normal_load
    use mesoslip_contacts_mechanics, only: coupling_names, coupling_scaled, coupling_table, &
       & delay_fixed, delay_names
    use mesoslip_interface_law, only: clocks, hazard_clock_type, interface_law_type, pose_type, &
       & window_type
    use mesoslip_contacts_threshold_laws, only: make_threshold_law
    use mesoslip_contacts_threshold_laws_base, only: threshold_law_type
-   use mesoslip_schedule, only: schedule_type
+   use mesoslip_schedule, only: max_events, schedule_type
    use mesoslip_track_strength, only: take_track_strength, track_strength_type
    implicit none
    private
@@ -66,6 +67,8 @@ module mesoslip_contacts_base
       type(track_strength_type) :: strength
       !> Law of the relative thresholds
       class(threshold_law_type), allocatable :: law
+      !> Normal load as the share of the contacts that it brings into contact
+      type(normal_load_type) :: load
       !> Key of the random numbers
       integer(i8) :: seed = 0, realization = 0
    end type contact_parameters_type
@@ -78,6 +81,8 @@ module mesoslip_contacts_base
       real(wp) :: detached_count = 0.0_wp, breaks = 0.0_wp
       !> Elastic energy lost by breaking, and gained by attaching under back force [J]
       type(accumulator_type) :: break_loss, birth_gain
+      !> Elastic energy lost by separating, as the normal load falls [J]
+      type(accumulator_type) :: separation_loss
       !> Error of steps: work done by the offered force minus that done on the contacts [J]; 0 for
       !> individual contacts
       type(accumulator_type) :: step_work
@@ -85,6 +90,8 @@ module mesoslip_contacts_base
       real(wp) :: error_estimate = 0.0_wp
       !> Cost of a response relative to that of one breaking contact
       real(wp) :: cost = 1.0_wp
+      !> Length of a schedule that is used up before the normal load ends it, about
+      integer :: schedule_length = max_events
       !> Clocks of thermally activated breaking, which the slider advances; whether there are any
       type(hazard_clock_type) :: clock(clocks)
       logical :: has_clocks = .false.
@@ -114,6 +121,8 @@ module mesoslip_contacts_base
       procedure :: take_extent
       !> Number of individual contacts
       procedure :: individual_count
+      !> Time at which the normal load next changes the contacts
+      procedure :: load_time
       !> State of all individual contacts, and records of some
       procedure :: snapshot
       procedure :: records
@@ -232,6 +241,15 @@ contains
       number = 0
    end function individual_count
 
+   !> Time at which the normal load next changes the contacts, which ends a schedule [s]; huge for
+   !> contacts that write none.
+   pure function load_time(self) result(time)
+      class(contacts_type), intent(in) :: self
+      real(wp) :: time
+
+      time = huge(1.0_wp)
+   end function load_time
+
    !> State of each individual contact.
    pure subroutine snapshot(self, time, displacement, values)
       class(contacts_type), intent(in) :: self
@@ -265,6 +283,9 @@ contains
       call archive%exchange("breaks", self%breaks)
       call archive%exchange("break_loss", self%break_loss)
       call archive%exchange("birth_gain", self%birth_gain)
+      if (self%parameters%load%changes) then
+         call archive%exchange("separation_loss", self%separation_loss)
+      end if
       call archive%exchange("step_work", self%step_work)
       call archive%exchange("error_estimate", self%error_estimate)
       call archive%exchange("cost", self%cost)
@@ -306,6 +327,7 @@ contains
       ! Below its own threshold the force at attaching rejects none.
       call make_threshold_law(self%law, law, parameters, &
          & merge(0.0_wp, self%back_force_ratio, self%keeps_thresholds), error)
+      call take_normal_load(self%load, parameters, error)
       if (allocated(error)) return
       if (self%law%has_stiffnesses .neqv. self%coupling == coupling_table) then
          call raise(error, status_invalid, "stiffnesses of a table of thresholds are for the " &

@@ -34,7 +34,7 @@ module mesoslip_contacts_ensemble
       !> Contacts of the breaks in the schedule
       integer, private :: listed(max_events) = 0
    contains
-      procedure :: initialize, offer, respond, plan, settle, join, exchange, rebuild
+      procedure :: initialize, offer, respond, plan, settle, join, leave, exchange, rebuild
       procedure, non_overridable, private :: break_due, plan_back
    end type contact_ensemble_type
 
@@ -193,6 +193,13 @@ contains
       call self%queue%insert(contact, self%direction * origin + limit)
       self%behind = max(self%behind, self%direction * origin - limit)
    end subroutine join
+
+   subroutine leave(self, contact)
+      class(contact_ensemble_type), intent(inout) :: self
+      integer, intent(in) :: contact
+
+      call self%queue%remove(self%record, contact)
+   end subroutine leave
 
    !> Break all contacts that are due.
    subroutine break_due(self, displacement, time)

@@ -9,6 +9,7 @@ module mesoslip_contacts_populations
    use mesoslip_contacts_ageing_law, only: ageing_law_type, take_ageing_law
    use mesoslip_contacts_base, only: contact_parameters_type, contacts_type, exchange_contacts
    use mesoslip_contacts_mechanics, only: coupling_equal, coupling_table
+   use mesoslip_contacts_populations_loading, only: begin_load, set_up_load
    use mesoslip_contacts_populations_offer, only: offer_step
    use mesoslip_contacts_populations_packets, only: new_detached_packets
    use mesoslip_contacts_populations_pinned, only: new_pinned_populations
@@ -91,6 +92,7 @@ contains
       if (allocated(error)) return
       if (ages) call self%pinned%set_ageing(ageing)
       if (is_thermal) call activate(self, rate, force, error)
+      call set_up_load(self)
       call move_alloc(self, contacts)
    end subroutine make_contact_populations
 
@@ -119,6 +121,7 @@ contains
          call self%pinned%sum_newborns(self%parameters%strength%factor(0.0_wp))
       end if
       call self%pinned%initialize(state, self%failure)
+      call begin_load(self)
    end subroutine initialize
 
    subroutine offer(self, pose, law, window)
@@ -162,6 +165,10 @@ contains
       call self%pinned%exchange(archive)
       call self%detached%exchange(archive)
       if (self%pinned%has_track) call archive%exchange("factor", self%pinned%factor)
+      if (self%parameters%load%changes) then
+         call archive%exchange("share", self%share)
+         call archive%exchange("load_piece", self%load_piece)
+      end if
       if (.not. self%pinned%is_thermal) return
       call archive%exchange("last_duration", self%last_duration)
       call archive%exchange("last_velocity", self%last_velocity)

@@ -14,6 +14,9 @@ module mesoslip_loop_scheduled
 
    public :: advance_through_schedule
 
+   !> Length of a schedule from which it costs less than its events one by one
+   integer, parameter :: min_length = 4
+
 contains
 
    !> Some advances of the slider through a schedule, or one without a schedule.
@@ -37,10 +40,13 @@ contains
 
       state%schedule%is_over = .true.
       if (state%max_schedule == 0 .or. state%avalanches%needs_each() &
-         & .or. abs(state%slider%drive%acceleration) > 0.0_wp) return
-      call state%contacts%plan(state%slider%pose(), state%max_schedule, state%schedule)
+         & .or. abs(state%slider%drive%acceleration) > 0.0_wp &
+         & .or. state%contacts%schedule_length < min_length) return
+      call state%contacts%plan(state%slider%pose(), &
+         & min(state%max_schedule, state%contacts%schedule_length), state%schedule)
       call state%stop%limit_schedule(state%schedule, state%slider%origin)
-      state%schedule%end_time = min(state%slider%drive%end_of_part(), state%steady%block_end)
+      state%schedule%end_time = min(state%slider%drive%end_of_part(), state%steady%block_end, &
+         & state%contacts%load_time())
       state%schedule%max_step = state%recorder%max_step()
       state%schedule%mean_stiffness = state%contacts%parameters%stiffness
       state%schedule%max_force = shift_stretches * state%contacts%parameters%static_force

@@ -21,10 +21,11 @@ module mesoslip_loop_state
 
    !> Terms of the energy balance: work of the drive; energy of the slider and its spring; of the
    !> contacts; losses by damping, by drag, by breaking; gain by attaching; work of steps beyond
-   !> that of the contacts; work of the drive, the sizes of its parts; residual
+   !> that of the contacts; loss by separating as the normal load falls; work of the drive, the
+   !> sizes of its parts; residual
    character(len=*), parameter :: energy_columns(*) = [character(len=name_length) :: &
       & "drive_work", "slider_energy", "contact_energy", "damping_loss", "drag_loss", &
-      & "break_loss", "birth_gain", "step_work", "gross_work", "residual"]
+      & "break_loss", "birth_gain", "step_work", "separation_loss", "gross_work", "residual"]
    integer, parameter :: energy_length = size(energy_columns)
    !> Names of the tables
    character(len=*), parameter :: table_names(*) = [character(len=name_length) :: "trace", &
@@ -102,9 +103,10 @@ contains
       energy(6) = self%contacts%break_loss%total()
       energy(7) = self%contacts%birth_gain%total()
       energy(8) = self%contacts%step_work%total()
-      energy(9) = self%slider%drive%gross_work()
-      energy(10) = energy(1) - (energy(2) + energy(3) - self%start_energy) &
-         & - energy(4) - energy(5) - energy(6) + energy(7) - energy(8)
+      energy(9) = self%contacts%separation_loss%total()
+      energy(10) = self%slider%drive%gross_work()
+      energy(11) = energy(1) - (energy(2) + energy(3) - self%start_energy) &
+         & - energy(4) - energy(5) - energy(6) + energy(7) - energy(8) - energy(9)
    end function energy_balance
 
    !> A table of recorded rows; null if there is no table of this name.

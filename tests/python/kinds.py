@@ -60,6 +60,19 @@ FORCE = {
 TRACK = {"contacts__track": {"spread": 0.3, "length": 2e-9, "correlation": "exponential"}}
 SMOOTH_TRACK = {"contacts__track": {"spread": 0.3, "length": 2e-9}}
 KEEP = {"contacts__renewal": "keep"}
+# A load that jumps, separates all contacts and brings them back; one that vibrates.
+LOAD = {
+    "load": {
+        "normal_force": 2.0,
+        "stage": [
+            {"duration": 0.03, "normal_force": 3.0},
+            {"duration": 0.04, "start_normal_force": 3.0, "end_normal_force": 0.8},
+            {"duration": 0.005, "normal_force": 0.0},
+            {"duration": 0.025, "start_normal_force": 0.0, "end_normal_force": 2.4},
+        ],
+    }
+}
+VIBRATING = {"load": {"normal_force": 1.0, "cycle": {"amplitude": 0.6, "frequency": 100.0}}}
 
 ME = {"run__engine": "me"}
 # Steps four times as long as by default, for master equations that take some tenths of a second.
@@ -194,6 +207,28 @@ KINDS: dict[str, dict[str, Any]] = {
         "contacts__count": 200,
         "contacts__ageing": RELAX | {"young_force_ratio": 0.9, "initial_age": 0.0},
     },
+    "rigid, load": LOAD,
+    "rigid, exponential delays, load": VIBRATING | RANDOM | NEWBORN,
+    "prescribed, vibrating load": VIBRATING | {"slider": {"kind": "prescribed"}},
+    "quasistatic, load": LOAD | {"slider": {"kind": "quasistatic", "stiffness": 97.0}},
+    "layered, ageing, load": LOAD | AGEING | {"slider": LAYERED},
+    "prescribed, ageing, load": VIBRATING | AGEING | {"slider": {"kind": "prescribed"}},
+    "rigid, ageing, some weaker, load": LOAD
+    | AGEING
+    | {
+        "contacts__threshold__relative_width": 0.2448,
+        "contacts__ageing": RELAX | {"young_force_ratio": 1.0, "young_relative_width": 0.1},
+    },
+    "force, thermal, load": VIBRATING | FORCE | THERMAL,
+    "prescribed, thermal, load": LOAD | THERMAL | {"slider": {"kind": "prescribed"}},
+    "rigid, thermal, ageing, load": LOAD | AGEING | THERMAL,
+    "rigid, me, load": LOAD | COARSE,
+    "rigid, exponential delays, me, load": VIBRATING | RANDOM | COARSE,
+    "prescribed, thermal, ageing, me, load": LOAD
+    | AGEING
+    | THERMAL
+    | COARSE
+    | {"slider": {"kind": "prescribed"}},
 }
 
 # Those between which outputs, and with them reports and pictures, differ.

@@ -69,6 +69,15 @@ FORCE = {
         ]
     },
 }
+LOAD = {
+    "load": {
+        "normal_force": 1.0,
+        "stage": [
+            {"duration": 0.02, "normal_force": 1.0},
+            {"duration": 0.02, "start_normal_force": 1.5, "end_normal_force": 0.5},
+        ],
+    }
+}
 FURTHER: dict[str, dict[str, Any]] = {
     "rigid-delays": SLIDERS["rigid"] | {"contacts__delay_law": "exponential"},
     "rigid-newborn": SLIDERS["rigid"] | {"contacts__newborn_width": 0.05},
@@ -95,6 +104,9 @@ FURTHER: dict[str, dict[str, Any]] = {
         "contacts__threshold__relative_width": 0.2,
     },
     "force": FORCE,
+    "rigid-load": SLIDERS["rigid"] | LOAD,
+    "prescribed-vibrating-load": SLIDERS["prescribed"]
+    | {"load": {"normal_force": 1.0, "cycle": {"amplitude": 0.4, "frequency": 200.0}}},
 }
 
 Case = Callable[[], xr.DataTree]

@@ -29,12 +29,13 @@ FORTRAN = ROOT / "fortran"
 MAY_USE: dict[str, set[str]] = {
     "numerics": set(),
     "extremes": {"numerics"},
+    "normal_load": {"numerics"},
     "interface_law": {"numerics"},
     "hazard": {"numerics", "interface_law"},
     "schedule": {"numerics", "interface_law", "hazard"},
     "step_filter": {"numerics"},
     "drive": {"numerics", "extremes"},
-    "contacts": {"numerics", "interface_law", "hazard", "schedule"},
+    "contacts": {"numerics", "interface_law", "hazard", "schedule", "normal_load"},
     "sliders": {"numerics", "interface_law", "hazard", "schedule", "step_filter", "drive"},
     "recording": {
         *("numerics", "interface_law", "schedule", "step_filter", "drive"),

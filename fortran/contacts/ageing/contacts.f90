@@ -15,11 +15,12 @@
 !> A contact that does not age breaks as in the ensemble without ageing, to the bit.
 module mesoslip_contacts_ageing_contacts
    use mesoslip_contacts_ageing_base, only: ageing_contacts_type, append, falling, in_falling, &
-      & in_queue, leaders, life_birth, life_length, life_limit, life_motion, near, next_length, &
-      & next_speed, no_motion
+      & in_leaders, in_queue, leaders, life_birth, life_length, life_limit, life_motion, near, &
+      & next_length, next_speed, no_motion, position_of, remove
    use mesoslip_contacts_ageing_falling, only: bound_falling, break_falling, scan, scan_if_needed
    use mesoslip_contacts_ageing_law, only: take_ageing_law
-   use mesoslip_contacts_ageing_leaders, only: add_leader, bound_leaders, break_leaders
+   use mesoslip_contacts_ageing_leaders, only: add_leader, bound_leaders, break_leaders, &
+      & remove_leader
    use mesoslip_contacts_ageing_motion, only: bound_speed, compare_motion, follow_motion, &
       & min_ratio, predict_motion
    use mesoslip_contacts_ageing_steady, only: break_steady, end_steady, plan_steady, &
@@ -27,7 +28,7 @@ module mesoslip_contacts_ageing_contacts
    use mesoslip_contacts_base, only: contact_parameters_type, contacts_type
    use mesoslip_contacts_individual_base, only: exchange_individual, total_law
    use mesoslip_contacts_individual_queue, only: new_contact_queue
-   use mesoslip_contacts_individual_record, only: row_limit
+   use mesoslip_contacts_individual_record, only: row_limit, row_stiffness
    use mesoslip_interface_law, only: interface_law_type, pose_type, window_type
    use mesoslip_numerics_archive, only: archive_type
    use mesoslip_numerics_errors, only: error_type, raise, status_memory
@@ -48,7 +49,7 @@ module mesoslip_contacts_ageing_contacts
    !> Contacts that age.
    type, extends(ageing_contacts_type) :: contact_ageing_type
    contains
-      procedure :: initialize, offer, respond, plan, settle, join, shift_order, exchange
+      procedure :: initialize, offer, respond, plan, settle, join, leave, shift_order, exchange
       procedure, private, non_overridable :: break_due, assign, reverse
    end type contact_ageing_type
 
@@ -110,6 +111,7 @@ contains
 
       call self%draw(state)
       do contact = 1, self%parameters%count
+         if (.not. self%record(row_stiffness, contact) > 0.0_wp) cycle
          self%life(life_birth, contact) = -self%ageing%initial_age
          self%life(life_limit, contact) = self%record(row_limit, contact)
          call self%assign(contact, 0.0_wp, 0.0_wp)
@@ -128,7 +130,7 @@ contains
       law = total_law(self)
       upper = huge(1.0_wp)
       lower = self%behind
-      end_time = self%detached%next_due
+      end_time = min(self%detached%next_due, self%sites%next_time)
       self%cost = 1.0_wp
       call predict_motion(self, pose, law)
       call follow_motion(self, pose)
@@ -157,7 +159,7 @@ contains
          call compare_motion(self, before, after)
       end if
       breaks = self%breaks
-      self%is_unchanged = self%detached%next_due > after%time
+      self%is_unchanged = min(self%detached%next_due, self%sites%next_time) > after%time
       if (self%is_steady) then
          if (abs(after%velocity - before%velocity) + abs(after%acceleration) > 0.0_wp) then
             call end_steady(self, after)
@@ -240,7 +242,12 @@ contains
 
       self%life(life_birth, contact) = pose%time
       self%life(life_limit, contact) = self%record(row_limit, contact)
-      if (self%is_steady) then
+      if (self%is_steady .and. self%touches) then
+         ! Its limit is not that of a contact that attaches under the back force.
+         self%next(next_speed, contact) = 0.0_wp
+         self%kept(contact) = in_queue
+         call self%solve(contact, pose%displacement, pose%time)
+      else if (self%is_steady) then
          call queue_newborn(self, contact)
       else
          self%next(next_speed, contact) = 0.0_wp
@@ -251,6 +258,25 @@ contains
          self%behind = max(self%behind, self%behind_at(contact, pose%time))
       end if
    end subroutine join
+
+   subroutine leave(self, contact)
+      class(contact_ageing_type), intent(inout) :: self
+      integer, intent(in) :: contact
+
+      integer :: position
+
+      select case (self%kept(contact))
+      case (in_leaders)
+         call remove_leader(self, position_of(self%list(leaders), contact))
+      case (in_falling)
+         position = position_of(self%list(near), contact)
+         if (position > 0) call remove(self%list(near), position)
+         call remove(self%list(falling), position_of(self%list(falling), contact))
+      case default
+         call self%queue%remove(self%record, contact)
+      end select
+      self%kept(contact) = in_queue
+   end subroutine leave
 
    !> Find where a contact is kept at the beginning of its life in a motion that is not steady.
    subroutine assign(self, contact, displacement, time)

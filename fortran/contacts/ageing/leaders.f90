@@ -14,7 +14,7 @@ module mesoslip_contacts_ageing_leaders
    implicit none
    private
 
-   public :: bound_leaders, break_leaders, add_leader
+   public :: bound_leaders, break_leaders, add_leader, remove_leader
 
    !> Relative change of the speed of approach up to which the time of a break is a short series
    real(wp), parameter :: max_excess = 1.0e-5_wp

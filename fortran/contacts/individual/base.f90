@@ -15,12 +15,14 @@ module mesoslip_contacts_individual_base
    use mesoslip_contacts_mechanics, only: coupling_table, delay_fixed
    use mesoslip_contacts_individual_record, only: record_length, row_limit, row_next, &
       & row_origin, row_renewal, row_stiffness, behind_coordinate
+   use mesoslip_contacts_individual_sites, only: contact_sites_type, new_contact_sites
    use mesoslip_interface_law, only: interface_law_type, pose_type, window_type
    use mesoslip_numerics_accumulator, only: accumulator_type
    use mesoslip_numerics_archive, only: archive_type
    use mesoslip_numerics_errors, only: error_type, raise, status_invalid, status_memory
    use mesoslip_numerics_memory, only: request_large_pages
-   use mesoslip_numerics_kinds, only: wp
+   use mesoslip_numerics_kinds, only: i8, wp
+   use mesoslip_numerics_random, only: uniform_pair
    use mesoslip_schedule, only: max_events, schedule_type
    implicit none
    private
@@ -29,11 +31,15 @@ module mesoslip_contacts_individual_base
 
    !> Number of contacts whose records are evaluated together for a snapshot
    integer, parameter :: snapshot_block = 256
+   !> Length of a schedule over the breaks between two changes of the normal load
+   real(wp), parameter :: length_ratio = 1.5_wp
 
    !> N individual contacts.
    type, abstract, extends(contacts_type) :: individual_contacts_type
       !> Records of the contacts, shape (record_length, count)
       real(wp), allocatable :: record(:, :)
+      !> Sites of the contacts under the normal load
+      type(contact_sites_type) :: sites
       !> Contacts that are detached
       type(detached_contacts_type) :: detached
       !> Contacts whose next thresholds have not been drawn
@@ -48,12 +54,17 @@ module mesoslip_contacts_individual_base
       real(wp) :: direction = 1.0_wp
       !> Upper bound of the coordinates at which contacts break after a reversal [m]
       real(wp) :: behind = -huge(1.0_wp)
+      !> Breaks until the normal load changed last
+      real(wp) :: breaks_at_load = 0.0_wp
+      !> Whether the contact that joins touches: it attaches without a force
+      logical :: touches = .false.
    contains
       procedure :: law => total_law
       procedure :: snapshot => snapshot_individual
-      procedure :: shift_origin, elastic_energy, individual_count, records, take_extent
-      !> Insert an attached contact into the order of breaking
+      procedure :: shift_origin, elastic_energy, individual_count, records, take_extent, load_time
+      !> Insert an attached contact into the order of breaking, and take a pinned one out
       procedure(join_interface), deferred :: join
+      procedure :: leave
       !> Maximum coordinate at which a pinned contact breaks after a reversal
       procedure :: behind_of
       !> Force of the neighbours on an attaching contact
@@ -66,6 +77,8 @@ module mesoslip_contacts_individual_base
       procedure, non_overridable :: allocate_records, draw
       !> Detach a contact that breaks, and attach all contacts that are due
       procedure, non_overridable :: detach, attach_due
+      !> Number of pinned contacts
+      procedure, non_overridable :: pinned_count
       !> Sort all contacts again from the records, and recompute the bound behind
       procedure, non_overridable :: rebuild_queue, max_behind
       !> Window between two coordinates
@@ -75,7 +88,7 @@ module mesoslip_contacts_individual_base
       !> Update records and sums after a schedule, but not the order of breaking
       procedure, non_overridable :: detach_listed, attach_listed
       procedure, non_overridable, private :: attach_next, draw_births, give_birth, list_lives, &
-         & own_excess, fit_to_track, sum_totals
+         & own_excess, fit_to_track, sum_totals, follow_load, touch, separate
    end type individual_contacts_type
 
    abstract interface
@@ -115,6 +128,7 @@ contains
       self%record = 0.0_wp
       call new_detached_contacts(self%detached, self%parameters%count, self%parameters%reattach, &
          & self%parameters%delay_law == delay_fixed, error)
+      if (.not. allocated(error)) call new_contact_sites(self%sites, self%parameters, error)
       if (.not. allocated(error)) call self%births%allocate_draws(self%parameters, error)
       if (.not. allocated(error)) call new_avalanche_track(self%track, columns, rows, error)
    end subroutine allocate_records
@@ -126,10 +140,18 @@ contains
       integer, intent(in) :: state
 
       real(wp) :: factor
+      integer :: order
 
       factor = 1.0_wp
       if (self%parameters%strength%is_used) factor = self%parameters%strength%factor(0.0_wp)
       call self%births%draw_all(self%parameters, state, factor, self%record)
+      do order = self%sites%count + 1, self%parameters%count
+         associate (record => self%record(:, self%sites%site_at(order)))
+            ! Its first life is over before it began.
+            record(row_stiffness) = 0.0_wp
+            record(row_renewal) = 1.0_wp
+         end associate
+      end do
       call self%sum_totals()
    end subroutine draw
 
@@ -150,7 +172,7 @@ contains
       real(wp), intent(in) :: behind, ahead, end_time
       type(window_type) :: window
 
-      window%end_time = end_time
+      window%end_time = min(end_time, self%sites%next_time)
       if (self%direction > 0.0_wp) then
          window%upper = ahead
          window%lower = behind
@@ -190,11 +212,19 @@ contains
          delay = self%births%delay(contact)
       end if
       call self%detached%push(contact, time + delay, drag)
-      if (self%detached%count == self%parameters%count) then
+      if (self%pinned_count() == 0) then
          self%stiffness = accumulator_type()
          self%offset = accumulator_type()
       end if
    end subroutine detach
+
+   !> Number of pinned contacts.
+   pure function pinned_count(self) result(number)
+      class(individual_contacts_type), intent(in) :: self
+      integer :: number
+
+      number = self%sites%count - self%detached%count
+   end function pinned_count
 
    !> Attach all contacts that are due, in the order of their attachment times.
    subroutine attach_due(self, pose)
@@ -214,6 +244,7 @@ contains
          call self%attach_next(pose, force, contact)
          call self%join(contact, pose)
       end do
+      if (self%sites%next_time <= pose%time) call self%follow_load(pose)
       self%detached_count = real(self%detached%count, wp)
    end subroutine attach_due
 
@@ -269,6 +300,105 @@ contains
       call self%births%request(contact, self%parameters, self%record)
    end subroutine attach_next
 
+   !> Let sites touch and separate as the normal load has changed.
+   subroutine follow_load(self, pose)
+      class(individual_contacts_type), intent(inout) :: self
+      type(pose_type), intent(in) :: pose
+
+      integer :: contact
+      logical :: touches
+
+      self%schedule_length = int(min(real(max_events, wp), &
+         & 2.0_wp + length_ratio * (self%breaks - self%breaks_at_load)))
+      self%breaks_at_load = self%breaks
+      do while (self%sites%next_time <= pose%time)
+         call self%sites%take_next(self%parameters, contact, touches)
+         if (contact == 0) cycle
+         if (touches) then
+            call self%touch(contact, pose)
+         else
+            call self%separate(contact, pose)
+         end if
+         if (allocated(self%failure)) return
+      end do
+   end subroutine follow_load
+
+   !> A site touches: its contact attaches without a force.
+   subroutine touch(self, contact, pose)
+      class(individual_contacts_type), intent(inout) :: self
+      integer, intent(in) :: contact
+      type(pose_type), intent(in) :: pose
+
+      real(wp) :: threshold, stiffness, limit, factor, uniform(2)
+
+      call self%draw_births([contact])
+      threshold = self%record(row_next, contact)
+      if (allocated(self%births%force) .and. .not. self%parameters%keeps_thresholds) then
+         ! The drawn threshold may have been rejected for the force at attaching.
+         call uniform_pair(self%parameters%seed, self%parameters%realization, &
+            & int(contact - 1, i8), int(self%record(row_renewal, contact), i8), 0_i8, uniform)
+         threshold = self%parameters%law%quantile(uniform(1))
+      end if
+      call bear(self%parameters, threshold, stiffness, limit)
+      if (self%parameters%strength%is_used) then
+         factor = self%parameters%strength%factor(pose%displacement)
+         limit = factor * limit
+         if (allocated(self%births%factor)) self%births%factor(contact) = factor
+      end if
+      call self%stiffness%add(stiffness)
+      call self%offset%add(stiffness * pose%displacement)
+      self%record(row_origin, contact) = pose%displacement
+      self%record(row_stiffness, contact) = stiffness
+      self%record(row_limit, contact) = limit
+      call self%births%request(contact, self%parameters, self%record)
+      self%touches = .true.
+      call self%join(contact, pose)
+      self%touches = .false.
+   end subroutine touch
+
+   !> A site separates: the energy of its contact is lost, and one that is detached does not attach.
+   subroutine separate(self, contact, pose)
+      class(individual_contacts_type), intent(inout) :: self
+      integer, intent(in) :: contact
+      type(pose_type), intent(in) :: pose
+
+      real(wp) :: stiffness, origin, drag
+
+      stiffness = self%record(row_stiffness, contact)
+      origin = self%record(row_origin, contact)
+      if (.not. stiffness > 0.0_wp) then
+         call self%detached%remove(contact, drag)
+         call self%drag%add(-drag)
+         if (self%detached%count == 0) self%drag = accumulator_type()
+         return
+      end if
+      call self%leave(contact)
+      self%record(row_stiffness, contact) = 0.0_wp
+      self%record(row_renewal, contact) = self%record(row_renewal, contact) + 1.0_wp
+      call self%separation_loss%add(0.5_wp * stiffness * (pose%displacement - origin)**2)
+      call self%stiffness%add(-stiffness)
+      call self%offset%add(-stiffness * origin)
+      if (self%pinned_count() > 0) return
+      self%stiffness = accumulator_type()
+      self%offset = accumulator_type()
+   end subroutine separate
+
+   !> Take a pinned contact out of the order of breaking; kinds that cannot end the run.
+   subroutine leave(self, contact)
+      class(individual_contacts_type), intent(inout) :: self
+      !> Number of the contact
+      integer, intent(in) :: contact
+
+      call raise(self%failure, status_invalid, "contacts of this kind do not separate")
+   end subroutine leave
+
+   pure function load_time(self) result(time)
+      class(individual_contacts_type), intent(in) :: self
+      real(wp) :: time
+
+      time = self%sites%next_time
+   end function load_time
+
    !> List the next contacts to attach in a schedule, up to a maximum number.
    subroutine list_attachments(self, limit, direction, schedule, contact)
       class(individual_contacts_type), intent(inout) :: self
@@ -299,7 +429,7 @@ contains
       schedule%offset = self%offset
       schedule%drag = self%drag
       schedule%detached = self%detached%count
-      schedule%pinned = self%parameters%count - self%detached%count
+      schedule%pinned = self%pinned_count()
    end subroutine list_attachments
 
    !> List the next births of the contacts that break in a schedule, if they can attach within it.
@@ -673,6 +803,7 @@ contains
       call exchange_contacts(self, archive)
       call archive%exchange("record", self%record)
       call self%births%exchange(archive)
+      call self%sites%exchange(self%parameters, archive)
       call self%detached%exchange(archive)
       call archive%exchange("stiffness", self%stiffness)
       call archive%exchange("offset", self%offset)

@@ -34,8 +34,8 @@ module mesoslip_contacts_individual_detached
       integer, private :: sorted_contact(max_sorted) = 0
       real(wp), private :: sorted_value(length, max_sorted) = 0.0_wp
    contains
-      !> Add a contact, find or remove the one that attaches next
-      procedure, non_overridable :: push, find_next, pop
+      !> Add a contact, find or remove the one that attaches next, remove any one
+      procedure, non_overridable :: push, find_next, pop, remove
       !> The next contacts to attach, and their times
       procedure, non_overridable :: preview
       !> Write the state to an archive, or read it
@@ -242,6 +242,75 @@ contains
          self%next_due = self%sorted_value(row_due, self%sorted_first)
       end if
    end subroutine pop
+
+   !> Remove a contact that will not attach.
+   pure subroutine remove(self, contact, drag)
+      class(detached_contacts_type), intent(inout) :: self
+      !> Its number, which is in the list
+      integer, intent(in) :: contact
+      !> Its drag [N s/m]
+      real(wp), intent(out) :: drag
+
+      integer :: place, last, next, steps
+
+      if (self%in_order) then
+         place = self%first + 1
+         do steps = 1, self%count - 1
+            if (self%contact(place) == contact) exit
+            place = next_place(place)
+         end do
+         drag = self%value(row_drag, place)
+         do steps = steps + 1, self%count
+            next = next_place(place)
+            self%contact(place) = self%contact(next)
+            self%value(:, place) = self%value(:, next)
+            place = next
+         end do
+      else
+         do place = self%sorted_first, self%sorted_last
+            if (self%sorted_contact(place) == contact) exit
+         end do
+         if (place <= self%sorted_last) then
+            drag = self%sorted_value(row_drag, place)
+            self%sorted_contact(place:self%sorted_last - 1) = &
+               & self%sorted_contact(place + 1:self%sorted_last)
+            self%sorted_value(:, place:self%sorted_last - 1) = &
+               & self%sorted_value(:, place + 1:self%sorted_last)
+            self%sorted_last = self%sorted_last - 1
+         else
+            last = self%heap_count()
+            do place = 1, last - 1
+               if (self%contact(place) == contact) exit
+            end do
+            drag = self%value(row_drag, place)
+            ! The first one of the heap is easy to remove.
+            self%value(row_due, place) = -huge(1.0_wp)
+            call self%sift_up(place)
+            self%contact(1) = self%contact(last)
+            self%value(:, 1) = self%value(:, last)
+            if (last > 1) call self%sift_down(last - 1)
+         end if
+      end if
+      self%count = self%count - 1
+      self%next_due = huge(1.0_wp)
+      if (self%count == 0 .or. .not. self%attach) return
+      if (self%in_order) then
+         self%next_due = self%value(row_due, self%first + 1)
+      else
+         if (self%sorted_last < self%sorted_first) call self%sort_next()
+         self%next_due = self%sorted_value(row_due, self%sorted_first)
+      end if
+
+   contains
+
+      !> The place after one in the ring.
+      pure integer function next_place(place)
+         integer, intent(in) :: place
+
+         next_place = merge(1, place + 1, place == self%capacity)
+      end function next_place
+
+   end subroutine remove
 
    !> Move the last contact of the heap up.
    pure subroutine sift_up(self, last)

@@ -53,12 +53,12 @@ module mesoslip_contacts_individual_queue
       integer, allocatable :: chunk_contact(:, :), chunk_next(:)
       integer :: free_chunk = 0
    contains
-      !> Insert a contact, remove the first one, remove all
-      procedure, non_overridable :: insert, pop, clear
+      !> Insert a contact, remove the first one, any one, or all
+      procedure, non_overridable :: insert, pop, remove, clear
       !> The first contacts, and removal of some of them
       procedure, non_overridable :: preview, remove_previewed
       procedure, non_overridable, private :: advance_front, take_overflow, bucket_of, append, &
-         & find_first, absorb_late
+         & find_first, absorb_late, take_from_bucket, first_overflow
    end type contact_queue_type
 
 contains
@@ -181,6 +181,109 @@ contains
       self%count = self%count - 1
       call self%find_first(record)
    end subroutine pop
+
+   !> Remove a contact of the queue, whose record is as it was when the contact was inserted.
+   subroutine remove(self, record, contact)
+      class(contact_queue_type), intent(inout) :: self
+      !> Records of all contacts, shape (record_length, number of contacts)
+      real(wp), intent(in), contiguous :: record(:, :)
+      !> Its number
+      integer, intent(in) :: contact
+
+      integer(i8) :: bucket
+      integer :: position
+      logical :: is_found
+
+      bucket = self%bucket_of(ahead_coordinate(record(:, contact), self%direction))
+      is_found = .false.
+      if (bucket > self%front_bucket) then
+         if (bucket <= self%front_bucket + self%ring_length) then
+            call self%take_from_bucket(int(iand(bucket, self%ring_length - 1)), contact, is_found)
+            if (is_found) self%ring_count = self%ring_count - 1
+         end if
+         if (.not. is_found) then
+            call self%take_from_bucket(self%overflow, contact, is_found)
+            if (is_found .and. bucket == self%overflow_first) then
+               self%overflow_first = self%first_overflow(record)
+            end if
+         end if
+      end if
+      if (.not. is_found) then
+         do position = self%front_next, self%front_count
+            if (self%front_contact(position) == contact) exit
+         end do
+         if (position <= self%front_count) then
+            self%front_key(position:self%front_count - 1) = &
+               & self%front_key(position + 1:self%front_count)
+            self%front_contact(position:self%front_count - 1) = &
+               & self%front_contact(position + 1:self%front_count)
+            self%front_count = self%front_count - 1
+         else
+            do position = 1, self%late_count - 1
+               if (self%late_contact(position) == contact) exit
+            end do
+            ! The first of the heap is easy to remove.
+            call push(self%late_key, self%late_contact, position, -no_key, contact)
+            call remove_first(self%late_key, self%late_contact, self%late_count)
+            self%late_count = self%late_count - 1
+         end if
+      end if
+      self%count = self%count - 1
+      call self%find_first(record)
+   end subroutine remove
+
+   !> Take a contact out of a bucket, if it is there; the last one takes its place.
+   pure subroutine take_from_bucket(self, slot, contact, is_found)
+      class(contact_queue_type), intent(inout) :: self
+      integer, intent(in) :: slot, contact
+      logical, intent(out) :: is_found
+
+      integer :: chunk, first, last, length, position
+
+      is_found = .false.
+      first = self%bucket_chunk(slot)
+      last = iand(self%bucket_count(slot) - 1, chunk_length - 1) + 1
+      if (self%bucket_count(slot) == 0) return
+      chunk = first
+      length = last
+      do while (chunk /= 0)
+         do position = 1, length
+            if (self%chunk_contact(position, chunk) == contact) exit
+         end do
+         is_found = position <= length
+         if (is_found) exit
+         length = chunk_length
+         chunk = self%chunk_next(chunk)
+      end do
+      if (.not. is_found) return
+      self%chunk_contact(position, chunk) = self%chunk_contact(last, first)
+      self%bucket_count(slot) = self%bucket_count(slot) - 1
+      if (last > 1) return
+      self%bucket_chunk(slot) = self%chunk_next(first)
+      self%chunk_next(first) = self%free_chunk
+      self%free_chunk = first
+   end subroutine take_from_bucket
+
+   !> Number of the first bucket of the contacts beyond the ring; huge without one.
+   pure function first_overflow(self, record) result(bucket)
+      class(contact_queue_type), intent(in) :: self
+      real(wp), intent(in), contiguous :: record(:, :)
+      integer(i8) :: bucket
+
+      integer :: chunk, length, position
+
+      bucket = huge(1_i8)
+      chunk = self%bucket_chunk(self%overflow)
+      length = iand(self%bucket_count(self%overflow) - 1, chunk_length - 1) + 1
+      do while (chunk /= 0)
+         do position = 1, length
+            bucket = min(bucket, self%bucket_of(ahead_coordinate( &
+               & record(:, self%chunk_contact(position, chunk)), self%direction)))
+         end do
+         length = chunk_length
+         chunk = self%chunk_next(chunk)
+      end do
+   end function first_overflow
 
    !> The first contacts in their order; no other contact has the key of one of them.
    subroutine preview(self, record, limit, contact, key, number)

@@ -54,6 +54,7 @@ module mesoslip_contacts_populations_breaking
       type(trial_type) :: trial
    contains
       procedure, non_overridable :: try, begin_trial, has_tried, forget_trial, break_tried
+      procedure, non_overridable :: tried_mix, keep
       procedure, non_overridable :: gap_ahead
       procedure, non_overridable, private :: list_breaking, find_thresholds, find_moments, &
          & find_left_of_table, sum_breaks, more_lost, remove_empty
@@ -411,6 +412,7 @@ contains
             else if (.not. self%keeps_order) then
                population(row, :) = population(self%count, :)
                self%left(:, row) = self%left(:, self%count)
+               if (allocated(self%mix)) self%mix(:, row) = self%mix(:, self%count)
                self%count = self%count - 1
             end if
          end do
@@ -444,8 +446,46 @@ contains
          self%population(kept, :) = self%population(row, :)
          self%left(:, kept) = self%left(:, row)
          if (allocated(self%kept)) self%kept(:, kept) = self%kept(:, row)
+         if (allocated(self%mix)) self%mix(:, kept) = self%mix(:, row)
       end do
       self%count = kept
    end subroutine remove_empty
+
+   !> Numbers of contacts that break in the trial, by the heights of their sites.
+   pure function tried_mix(self) result(numbers)
+      class(breaking_populations_type), intent(in) :: self
+      real(wp) :: numbers(size(self%newborn_mix))
+
+      integer :: trial
+
+      numbers = 0.0_wp
+      do trial = 1, self%trial%count
+         associate (row => self%trial%population(trial))
+            numbers = numbers + (self%left(number, row) - self%trial%moments(number, trial)) &
+               & * self%mix(:, row)
+         end associate
+      end do
+   end function tried_mix
+
+   !> Keep parts of the contacts by the heights of their sites.
+   subroutine keep(self, part)
+      class(breaking_populations_type), intent(inout) :: self
+      real(wp), intent(in) :: part(:)
+
+      real(wp) :: all
+      integer :: row
+
+      do row = 1, self%count
+         associate (mix => self%mix(:, row))
+            mix = mix * part
+            all = sum(mix)
+            if (all > 0.0_wp) mix = mix / all
+         end associate
+         self%population(row, column_weight) = all * self%population(row, column_weight)
+         self%left(:, row) = all * self%left(:, row)
+      end do
+      call self%remove_empty()
+      call self%sum_forces()
+   end subroutine keep
 
 end module mesoslip_contacts_populations_breaking

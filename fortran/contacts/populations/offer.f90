@@ -7,6 +7,8 @@
 !> The steps are of second order.
 module mesoslip_contacts_populations_offer
    use mesoslip_contacts_populations_breaking, only: tiny_gap
+   use mesoslip_contacts_populations_loading, only: add_load_changes, end_of_load_step, &
+      & expected_change
    use mesoslip_contacts_populations_motion, only: distance_in, max_time, patience, time_after, &
       & time_to_move
    use mesoslip_contacts_populations_packets, only: expected_births_type, shorten_step
@@ -45,6 +47,7 @@ contains
       type(window_type), intent(out) :: window
 
       real(wp) :: direction, max_span, span, distance, reach, limit, max_births, slack, growing
+      real(wp) :: load_end, load_change
       logical :: breaks, moves, is_quiet, rests
       type(expected_births_type) :: births
       type(pose_type) :: expected
@@ -76,7 +79,8 @@ contains
       end if
       self%max_fall_time = huge(1.0_wp)
       if (self%pinned%some_fall) self%max_fall_time = time_to_fall(self, pose, span)
-      max_span = min(max_span, self%max_fall_time)
+      load_end = end_of_load_step(self)
+      max_span = min(max_span, self%max_fall_time, load_end - pose%time)
       if (self%pinned%is_thermal .and. breaks) then
          ! Long enough for a slider that hardly oscillates to settle.
          growing = max_growth * min(self%last_duration, max_time)
@@ -99,8 +103,9 @@ contains
       end if
       breaks = self%pinned%trial%count > 0
 
-      moves = breaks .or. births%number > 0.0_wp
-      window%end_time = births%end_time
+      load_change = expected_change(self, min(time_after(pose%time, span), load_end))
+      moves = breaks .or. births%number > 0.0_wp .or. abs(load_change) > 0.0_wp
+      window%end_time = min(births%end_time, load_end)
       if (moves .and. max_span < max_time) then
          window%end_time = min(window%end_time, time_after(pose%time, max_span))
       end if
@@ -124,7 +129,10 @@ contains
 
       law = self%law()
       self%detached_count = self%detached%number%total()
-      if (moves) call add_changes(self, expected, direction, span, distance, births, law)
+      if (moves) then
+         call add_changes(self, expected, direction, span, distance, births, law)
+         call add_load_changes(self, expected, load_change, span, direction * distance, law)
+      end if
       if (self%pinned%is_thermal) call smooth_excess(self, window%end_time - pose%time, law)
       self%offered = law
       self%offers = .true.

@@ -62,10 +62,15 @@ module mesoslip_contacts_populations_packets
       real(wp), private :: fresh(2) = 0.0_wp
       !> The packets, shape (packet_length, packets)
       real(wp), allocatable, private :: packet(:, :)
+      !> Under a changing load, by the heights of sites: numbers of all detached contacts, of those
+      !> that are pending, and of the breaks in the last step, shape (bins); parts of the packets,
+      !> shape (bins, packets)
+      real(wp), allocatable, private :: held(:), pending_held(:), fresh_held(:), mix(:, :)
    contains
-      procedure, non_overridable :: add, is_empty, expect, own_part, take_due, exchange
+      procedure, non_overridable :: add, is_empty, expect, own_part, take_due, set_bins, keep, &
+         & exchange
       procedure, non_overridable, private :: due_times, continues, make_room, expect_random, &
-         & take_random
+         & take_random, remove_empty
    end type detached_packets_type
 
 contains
@@ -82,18 +87,31 @@ contains
       allocate (self%packet(packet_length, initial_packets), source=0.0_wp)
    end subroutine new_detached_packets
 
+   !> Keep contacts by the heights of their sites, in a number of bins.
+   subroutine set_bins(self, bins)
+      class(detached_packets_type), intent(inout) :: self
+      integer, intent(in) :: bins
+
+      allocate (self%held(bins), self%pending_held(bins), self%fresh_held(bins), &
+         & self%mix(bins, size(self%packet, 2)), source=0.0_wp)
+   end subroutine set_bins
+
    !> Add contacts that broke evenly from one time to another [s], and their mass.
-   subroutine add(self, start_time, end_time, number, mass, error)
+   subroutine add(self, start_time, end_time, number, mass, held, error)
       class(detached_packets_type), intent(inout) :: self
       real(wp), intent(in) :: start_time, end_time, number, mass
+      !> Under a changing load, their numbers by the heights of sites
+      real(wp), intent(in) :: held(:)
       !> Set if there is not enough memory
       type(error_type), allocatable, intent(inout) :: error
 
       call self%number%add(number)
       call self%mass%add(mass)
+      if (allocated(self%held)) self%held = self%held + held
       if (.not. (self%reattach .and. number > 0.0_wp)) return
       if (self%is_random) then
          self%fresh = [number, mass]
+         if (allocated(self%held)) self%fresh_held = held
          return
       end if
       ! Few pending contacts count as broken together with more that follow: their delay is not
@@ -105,11 +123,16 @@ contains
       self%pending(row_end) = end_time
       self%pending(row_number) = self%pending(row_number) + number
       self%pending(row_mass) = self%pending(row_mass) + mass
+      if (allocated(self%held)) self%pending_held = self%pending_held + held
       if (self%pending(row_number) < self%negligible) return
       if (self%last == size(self%packet, 2)) call self%make_room(error)
       if (allocated(error)) return
       self%last = self%last + 1
       self%packet(:, self%last) = self%pending
+      if (allocated(self%held)) then
+         self%mix(:, self%last) = self%pending_held / sum(self%pending_held)
+         self%pending_held = 0.0_wp
+      end if
       self%pending = 0.0_wp
    end subroutine add
 
@@ -142,20 +165,28 @@ contains
       class(detached_packets_type), intent(inout) :: self
       type(error_type), allocatable, intent(inout) :: error
 
-      real(wp), allocatable :: larger(:, :)
+      real(wp), allocatable :: larger(:, :), mix(:, :)
       integer :: waiting, stat
 
       waiting = self%last - self%first + 1
       if (2 * waiting > size(self%packet, 2)) then
          allocate (larger(packet_length, 2 * size(self%packet, 2)), source=0.0_wp, stat=stat)
+         if (stat == 0 .and. allocated(self%mix)) then
+            allocate (mix(size(self%mix, 1), 2 * size(self%packet, 2)), source=0.0_wp, stat=stat)
+         end if
          if (stat /= 0) then
             call raise(error, status_memory, "not enough memory for the detached contacts")
             return
          end if
          larger(:, :waiting) = self%packet(:, self%first:self%last)
          call move_alloc(larger, self%packet)
+         if (allocated(mix)) then
+            mix(:, :waiting) = self%mix(:, self%first:self%last)
+            call move_alloc(mix, self%mix)
+         end if
       else
          self%packet(:, :waiting) = self%packet(:, self%first:self%last)
+         if (allocated(self%mix)) self%mix(:, :waiting) = self%mix(:, self%first:self%last)
       end if
       self%first = 1
       self%last = waiting
@@ -243,18 +274,21 @@ contains
    end subroutine expect
 
    !> Take out all contacts that are due to attach.
-   subroutine take_due(self, before, after, births, moment, when)
+   subroutine take_due(self, before, after, births, moment, when, held)
       class(detached_packets_type), intent(inout) :: self
       type(pose_type), intent(in) :: before, after
       !> Their number, and sums over them of displacement [m] and time [s] of attaching
       real(wp), intent(out) :: births, moment, when
+      !> Under a changing load, their numbers by the heights of sites
+      real(wp), intent(inout) :: held(:)
 
       real(wp) :: early, late, until, part, part_before, more
 
       births = 0.0_wp
       moment = 0.0_wp
       when = 0.0_wp
-      if (self%is_random) call self%take_random(before, after, births, moment, when)
+      held = 0.0_wp
+      if (self%is_random) call self%take_random(before, after, births, moment, when, held)
       do while (self%first <= self%last)
          call self%due_times(self%first, early, late)
          if (early > after%time) exit
@@ -267,6 +301,7 @@ contains
          end if
          more = self%packet(row_number, self%first) * (part - part_before)
          births = births + more
+         if (allocated(self%mix)) held = held + more * self%mix(:, self%first)
          moment = moment + more * position_at(before, after, 0.5_wp * (early + until))
          when = when + more * 0.5_wp * (early + until)
          call self%mass%add(-self%packet(row_mass, self%first) * (part - part_before))
@@ -280,6 +315,7 @@ contains
          self%last = 0
       end if
       if (births > 0.0_wp) call self%number%add(-births)
+      if (allocated(self%held)) self%held = max(0.0_wp, self%held - held)
    end subroutine take_due
 
    !> Part of the contacts that break evenly in a step of a duration [s] which attaches in it.
@@ -327,10 +363,10 @@ contains
    end subroutine expect_random
 
    !> The same as take_due for exponential delays.
-   subroutine take_random(self, before, after, births, moment, when)
+   subroutine take_random(self, before, after, births, moment, when, held)
       class(detached_packets_type), intent(inout) :: self
       type(pose_type), intent(in) :: before, after
-      real(wp), intent(inout) :: births, moment, when
+      real(wp), intent(inout) :: births, moment, when, held(:)
 
       real(wp) :: duration, ratio, part(2), number(2), time(2)
 
@@ -341,6 +377,10 @@ contains
       time = before%time + duration * [mean_attached_time(ratio), mean_own_time(ratio)]
       number = part * [max(0.0_wp, self%number%total() - self%fresh(1)), self%fresh(1)]
       births = sum(number)
+      if (allocated(self%held)) then
+         held = part(1) * max(0.0_wp, self%held - self%fresh_held) + part(2) * self%fresh_held
+         self%fresh_held = 0.0_wp
+      end if
       moment = number(1) * position_at(before, after, time(1)) &
          & + number(2) * position_at(before, after, time(2))
       when = sum(number * time)
@@ -362,6 +402,71 @@ contains
       distance = distance_in(pose, direction, span)
    end subroutine shorten_step
 
+   !> Keep parts of the contacts by the heights of their sites.
+   subroutine keep(self, part)
+      class(detached_packets_type), intent(inout) :: self
+      real(wp), intent(in) :: part(:)
+
+      real(wp) :: number, mass, share, lost_mass
+      integer :: index
+
+      number = sum(self%held)
+      mass = self%mass%total()
+      self%held = part * self%held
+      share = 0.0_wp
+      if (number > 0.0_wp) share = sum(self%held) / number
+      lost_mass = (1.0_wp - share) * mass
+      if (self%is_random) then
+         self%fresh_held = part * self%fresh_held
+         if (self%fresh(1) > 0.0_wp) self%fresh = self%fresh * sum(self%fresh_held) / self%fresh(1)
+      else if (self%reattach) then
+         lost_mass = 0.0_wp
+         do index = self%first, self%last
+            associate (mix => self%mix(:, index), packet => self%packet(:, index))
+               mix = part * mix
+               share = sum(mix)
+               if (share > 0.0_wp) mix = mix / share
+               lost_mass = lost_mass + (1.0_wp - share) * packet(row_mass) &
+                  & * (1.0_wp - merge(self%first_part, 0.0_wp, index == self%first))
+               packet(row_number:row_mass) = share * packet(row_number:row_mass)
+            end associate
+         end do
+         call self%remove_empty()
+         if (self%pending(row_number) > 0.0_wp) then
+            share = sum(part * self%pending_held) / sum(self%pending_held)
+            self%pending_held = part * self%pending_held
+            lost_mass = lost_mass + (1.0_wp - share) * self%pending(row_mass)
+            self%pending(row_number:row_mass) = share * self%pending(row_number:row_mass)
+            if (.not. share > 0.0_wp) self%pending = 0.0_wp
+         end if
+      end if
+      self%number = accumulator_type()
+      self%mass = accumulator_type()
+      if (.not. sum(self%held) > 0.0_wp) return
+      call self%number%add(sum(self%held))
+      call self%mass%add(max(0.0_wp, mass - lost_mass))
+   end subroutine keep
+
+   !> Remove packets without contacts.
+   subroutine remove_empty(self)
+      class(detached_packets_type), intent(inout) :: self
+
+      integer :: index, last
+
+      last = self%first - 1
+      do index = self%first, self%last
+         if (.not. self%packet(row_number, index) > 0.0_wp) then
+            if (index == self%first) self%first_part = 0.0_wp
+            cycle
+         end if
+         last = last + 1
+         if (last == index) cycle
+         self%packet(:, last) = self%packet(:, index)
+         self%mix(:, last) = self%mix(:, index)
+      end do
+      self%last = last
+   end subroutine remove_empty
+
    !> Put the state into an archive or take it out.
    subroutine exchange(self, archive)
       class(detached_packets_type), intent(inout) :: self
@@ -379,6 +484,12 @@ contains
       call archive%exchange("attached_part", self%first_part)
       call archive%exchange("number", self%number)
       call archive%exchange("mass", self%mass)
+      if (allocated(self%held)) then
+         call archive%exchange("held", self%held)
+         call archive%exchange("pending_held", self%pending_held)
+         call archive%exchange("fresh_held", self%fresh_held)
+         call archive%exchange("mix", self%mix)
+      end if
       if (.not. self%is_random) return
       pending = self%fresh
       call archive%exchange("fresh", pending)

@@ -39,6 +39,8 @@ module mesoslip_contacts_populations_pinned
       real(wp) :: factor = 1.0_wp
       !> Mean relative force of a contact that attaches
       real(wp) :: newborn_force = 0.0_wp
+      !> Mean stiffness of a contact that touches [N/m]
+      real(wp) :: touching_stiffness = 0.0_wp
       !> Number of forces at attaching; for each the relative force, the threshold up to which no
       !> contact can attach with it, and the shares of contacts: before the rejection of these, not
       !> normalized and normalized, and after it
@@ -47,7 +49,7 @@ module mesoslip_contacts_populations_pinned
          & weight(max_classes) = 1.0_wp, share(max_classes) = 1.0_wp, &
          & newborn_share(max_classes) = 1.0_wp
    contains
-      procedure, non_overridable :: set_ageing, activate, initialize, attach, sum_newborns
+      procedure, non_overridable :: set_ageing, activate, initialize, attach, touch, sum_newborns
       procedure, non_overridable, private :: tabulate_moments, place_classes, law_of, &
          & may_join_last, add_sliding
    end type pinned_populations_type
@@ -143,7 +145,7 @@ contains
       class(pinned_populations_type), intent(inout) :: self
       real(wp), intent(in) :: factor
 
-      real(wp) :: left(moments_length, max_classes)
+      real(wp) :: left(moments_length, max_classes), touching(moments_length)
       integer :: class
 
       self%factor = factor
@@ -167,6 +169,12 @@ contains
             self%newborn_force = sum(share * all(number, :) * force)
          end if
          self%newborn_stiffness = self%parameters%stiffness * sum(share * all(stiff, :))
+         if (self%has_table) then
+            call self%table_lives%left(1, 0.0_wp, 0.0_wp, touching)
+         else
+            call self%moments(1)%interpolate(0.0_wp, touching)
+         end if
+         self%touching_stiffness = self%parameters%stiffness * touching(stiff)
          self%newborn_energy = 0.5_wp * sum(share * all(compliant, :) * force**2) * static &
             & * self%stretch
       end associate
@@ -300,6 +308,27 @@ contains
       self%open_origin = origin
       self%open_direction = direction
    end subroutine attach
+
+   !> Let contacts touch as one population without a force.
+   subroutine touch(self, contacts, factor, origin, birth, displacement, time, error)
+      class(pinned_populations_type), intent(inout) :: self
+      !> Their number, the factor of their thresholds on a track, and where [m] and when [s] they
+      !> touch on average
+      real(wp), intent(in) :: contacts, factor, origin, birth
+      !> Displacement of the slider [m], and time [s]
+      real(wp), intent(in) :: displacement, time
+      type(error_type), allocatable, intent(inout) :: error
+
+      call self%add(origin, 0.0_wp, factor, contacts, 1, 0.0_wp, displacement, birth, time, error)
+      if (allocated(error)) return
+      if (self%is_thermal) call self%begin_hazard(self%count, time - birth, &
+         & 0.5_wp * (displacement - origin) / self%stretch)
+      call self%stiffness%add(self%touching_stiffness * contacts)
+      call self%offset%add(self%touching_stiffness * contacts * origin)
+      self%last_birth = time
+      ! Contacts that attach later do not join these.
+      self%open_count = 0
+   end subroutine touch
 
    !> Law of the contacts that attach with one of the forces in a direction of motion.
    pure function law_of(self, class, direction) result(law)

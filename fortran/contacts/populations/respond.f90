@@ -1,5 +1,6 @@
 !> Response of populations to a motion of the slider: contacts break, and others attach.
 module mesoslip_contacts_populations_respond
+   use mesoslip_contacts_populations_loading, only: follow_load, jump_load
    use mesoslip_contacts_populations_motion, only: excess_of_mean
    use mesoslip_contacts_populations_state, only: population_state_type
    use mesoslip_interface_law, only: interface_law_type, pose_type
@@ -36,6 +37,7 @@ contains
       end if
       if (has_broken) call detach_tried(self, before, after)
       if (.not. self%detached%is_empty()) call attach_due(self, start, end)
+      call follow_load(self, start, end)
       if (self%pinned%ages) call self%pinned%update_thresholds(after%displacement, after%time)
       if (self%pinned%some_fall .and. .not. self%pinned%is_thermal) then
          call break_fallen(self, before, after)
@@ -43,6 +45,7 @@ contains
       self%detached_count = self%detached%number%total()
       self%cost = 1.0_wp + self%pinned%count / populations_per_cost
       if (self%pinned%is_thermal) call record_step(self, before, after)
+      call jump_load(self, after)
       self%offers = .false.
    end subroutine respond_to_motion
 
@@ -51,11 +54,16 @@ contains
       class(population_state_type), intent(inout) :: self
       type(pose_type), intent(in) :: before, after
 
+      real(wp), allocatable :: held(:)
+
+      allocate (held(0))
+      if (allocated(self%pinned%mix)) held = self%pinned%tried_mix()
       call self%pinned%break_tried(self%break_loss)
       associate (trial => self%pinned%trial)
          self%breaks = self%breaks + trial%breaks
          call self%step_work%add(trial%work)
-         call self%detached%add(before%time, after%time, trial%breaks, trial%mass, self%failure)
+         call self%detached%add(before%time, after%time, trial%breaks, trial%mass, held, &
+            & self%failure)
       end associate
    end subroutine detach_tried
 
@@ -173,9 +181,12 @@ contains
       type(pose_type), intent(in) :: before, after
 
       real(wp) :: births, moment, when, origin, force, lost
+      real(wp), allocatable :: held(:)
 
-      call self%detached%take_due(before, after, births, moment, when)
+      allocate (held(self%bins()), source=0.0_wp)
+      call self%detached%take_due(before, after, births, moment, when, held)
       if (.not. births > 0.0_wp) return
+      if (size(held) > 0) self%pinned%newborn_mix = held / births
 
       origin = moment / births
       if (self%pinned%has_track) then

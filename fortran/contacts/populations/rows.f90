@@ -106,9 +106,12 @@ module mesoslip_contacts_populations_rows
       !> With ageing and thermal activation, surviving part at nodes over the thresholds, shape
       !> (nodes, count or more)
       real(wp), allocatable :: kept(:, :)
+      !> Under a changing load, parts of a population by the heights of its sites, shape (bins,
+      !> count or more), and those of the next one, shape (bins)
+      real(wp), allocatable :: mix(:, :), newborn_mix(:)
    contains
       procedure, non_overridable :: add, next_break, update_thresholds, sum_forces, shift_origin, &
-         & number_of_contacts, elastic_energy, exchange
+         & number_of_contacts, elastic_energy, scale_all, sum_bin, exchange
       procedure, non_overridable, private :: make_room, next_break_of_table
    end type population_rows_type
 
@@ -171,6 +174,7 @@ contains
             population(row, column_behind) = origin - self%stretch * behind
          end if
          if (allocated(self%kept)) self%kept(:, row) = 1.0_wp
+         if (allocated(self%mix)) self%mix(:, row) = self%newborn_mix
          population(row, column_ahead) = max(displacement, self%next_break(row, 1.0_wp, time))
          population(row, column_behind) = min(displacement, self%next_break(row, -1.0_wp, time))
          self%ahead = min(self%ahead, population(row, column_ahead))
@@ -183,7 +187,7 @@ contains
       class(population_rows_type), intent(inout) :: self
       type(error_type), allocatable, intent(inout) :: error
 
-      real(wp), allocatable :: population(:, :), left(:, :), kept(:, :)
+      real(wp), allocatable :: population(:, :), left(:, :), kept(:, :), mix(:, :)
       integer :: stat
 
       if (self%count < size(self%population, 1)) return
@@ -191,6 +195,9 @@ contains
       if (stat == 0) allocate (left(moments_length, 2 * self%count), source=0.0_wp, stat=stat)
       if (stat == 0 .and. allocated(self%kept)) then
          allocate (kept(size(self%kept, 1), 2 * self%count), source=0.0_wp, stat=stat)
+      end if
+      if (stat == 0 .and. allocated(self%mix)) then
+         allocate (mix(size(self%mix, 1), 2 * self%count), source=0.0_wp, stat=stat)
       end if
       if (stat /= 0) then
          call raise(error, status_memory, "not enough memory for the populations of contacts")
@@ -200,6 +207,10 @@ contains
       call move_alloc(population, self%population)
       left(:, :self%count) = self%left
       call move_alloc(left, self%left)
+      if (allocated(mix)) then
+         mix(:, :self%count) = self%mix
+         call move_alloc(mix, self%mix)
+      end if
       if (.not. allocated(kept)) return
       kept(:, :self%count) = self%kept
       call move_alloc(kept, self%kept)
@@ -297,6 +308,39 @@ contains
       self%behind = maxval(self%population(:self%count, column_behind))
    end subroutine sum_forces
 
+   !> Multiply the numbers of all contacts.
+   subroutine scale_all(self, factor)
+      class(population_rows_type), intent(inout) :: self
+      real(wp), intent(in) :: factor
+
+      associate (weight => self%population(:self%count, column_weight))
+         weight = factor * weight
+      end associate
+      self%left(:, :self%count) = factor * self%left(:, :self%count)
+   end subroutine scale_all
+
+   !> Stiffness [N/m], and stiffness times origin minus force at attaching [N], of the contacts in a
+   !> bin of heights.
+   pure subroutine sum_bin(self, bin, stiffness, offset)
+      class(population_rows_type), intent(in) :: self
+      integer, intent(in) :: bin
+      real(wp), intent(out) :: stiffness, offset
+
+      integer :: row
+
+      stiffness = 0.0_wp
+      offset = 0.0_wp
+      do row = 1, self%count
+         associate (one => self%population(row, :), left => self%left(:, row), &
+            & part => self%mix(bin, row))
+            stiffness = stiffness + part * self%parameters%stiffness * left(stiff)
+            offset = offset + part * (self%parameters%stiffness * left(stiff) &
+               & * one(column_origin) - self%parameters%static_force * left(number) &
+               & * one(column_force))
+         end associate
+      end do
+   end subroutine sum_bin
+
    !> Shift the origin of displacements [m].
    subroutine shift_origin(self, shift)
       class(population_rows_type), intent(inout) :: self
@@ -349,6 +393,7 @@ contains
       call archive%exchange("population", self%population)
       call archive%exchange("left", self%left)
       if (allocated(self%kept)) call archive%exchange("kept", self%kept)
+      if (allocated(self%mix)) call archive%exchange("mix", self%mix)
       call archive%exchange("count", self%count)
       call archive%exchange("ahead", self%ahead)
       call archive%exchange("behind", self%behind)

@@ -31,7 +31,13 @@ module mesoslip_contacts_populations_state
       !> With thermal activation: duration of the last step [s], mean velocity in it [m/s], and
       !> offered force minus contact force at its end [N]
       real(wp) :: last_duration = huge(1.0_wp), last_velocity = 0.0_wp, excess = 0.0_wp
+      !> Share of the sites in contact, and piece of the normal load
+      real(wp) :: share = 1.0_wp
+      integer :: load_piece = 1
+      !> Edges of bins of the heights of sites, from 0 on, as shares; shape (bins + 1)
+      real(wp), allocatable :: edge(:)
    contains
+      procedure, non_overridable :: bins
       procedure :: law
       procedure, non_overridable :: oscillation_rate
    end type population_state_type
@@ -46,6 +52,15 @@ contains
       law%offset = self%pinned%offset%total()
       law%drag = self%parameters%drag * self%detached%mass%total()
    end function law
+
+   !> Number of bins of heights; 0 without a changing load.
+   pure function bins(self) result(number)
+      class(population_state_type), intent(in) :: self
+      integer :: number
+
+      number = 0
+      if (allocated(self%edge)) number = size(self%edge) - 1
+   end function bins
 
    !> Rate at which the slider oscillates or is damped on the contacts [1/s]; 0 for a slider with
    !> prescribed motion.

@@ -327,6 +327,9 @@ contains
             population(row, column_birth) = population(row, column_birth) &
                & + part * (birth - population(row, column_birth))
          end if
+         if (allocated(self%mix)) then
+            self%mix(:, row) = self%mix(:, row) + part * (self%newborn_mix - self%mix(:, row))
+         end if
          population(row, column_weight) = all / self%number_left(row)
          self%left(:, row) = all
          population(row, column_ahead) = max(displacement, self%next_break(row, 1.0_wp, time))

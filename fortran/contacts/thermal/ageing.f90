@@ -51,8 +51,8 @@ module mesoslip_contacts_thermal_ageing
       !> Whether contacts are those of the start
       logical, private :: is_start = .false.
    contains
-      procedure :: initialize, offer, plan, begin_life, accepts_break, update_bounds, rebuild, &
-         & records, exchange, limit_at_birth
+      procedure :: initialize, offer, plan, leave, begin_life, accepts_break, update_bounds, &
+         & rebuild, records, exchange, limit_at_birth
       procedure, non_overridable, private :: set_bound, renew_bound, threshold, mean_of
    end type thermal_ageing_contacts_type
 
@@ -115,6 +115,14 @@ contains
 
       schedule%is_over = .true.
    end subroutine plan
+
+   subroutine leave(self, contact)
+      class(thermal_ageing_contacts_type), intent(inout) :: self
+      integer, intent(in) :: contact
+
+      call self%order_renewal%remove(contact)
+      call self%thermal_contacts_type%leave(contact)
+   end subroutine leave
 
    subroutine begin_life(self, contact, pose)
       class(thermal_ageing_contacts_type), intent(inout) :: self

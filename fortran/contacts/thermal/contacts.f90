@@ -10,7 +10,7 @@
 module mesoslip_contacts_thermal_contacts
    use mesoslip_contacts_base, only: contact_parameters_type, contacts_type
    use mesoslip_contacts_individual_base, only: total_law
-   use mesoslip_contacts_individual_record, only: row_origin
+   use mesoslip_contacts_individual_record, only: row_origin, row_stiffness
    use mesoslip_contacts_thermal_keys, only: life_clock, life_key, life_left, life_next, motions
    use mesoslip_contacts_thermal_steady, only: thermal_steady_type, set_up_steady
    use mesoslip_hazard, only: force_sign, never
@@ -30,7 +30,8 @@ module mesoslip_contacts_thermal_contacts
    type, extends(thermal_steady_type) :: thermal_contacts_type
    contains
       procedure :: initialize => initialize_thermal
-      procedure :: offer, respond, plan, settle, join, begin_life, accepts_break, update_bounds
+      procedure :: offer, respond, plan, settle, join, leave, begin_life, accepts_break, &
+         & update_bounds
       procedure, non_overridable :: break_contact
       procedure, non_overridable, private :: break_and_attach, pass_ahead, break_by_clock, &
          & respond_steadily
@@ -64,7 +65,7 @@ contains
 
       call self%draw(state)
       do contact = 1, self%parameters%count
-         call self%join(contact, pose)
+         if (self%record(row_stiffness, contact) > 0.0_wp) call self%join(contact, pose)
       end do
    end subroutine initialize_thermal
 
@@ -241,6 +242,14 @@ contains
       call self%move_reference(number, pose%displacement)
       call self%put(contact)
    end subroutine join
+
+   subroutine leave(self, contact)
+      class(thermal_contacts_type), intent(inout) :: self
+      integer, intent(in) :: contact
+
+      call self%take_out(contact)
+      self%life(:life_key, contact) = 0.0_wp
+   end subroutine leave
 
    subroutine settle(self, schedule, pose)
       class(thermal_contacts_type), intent(inout) :: self

@@ -165,10 +165,10 @@ contains
 
       stretch = pose%displacement - self%record(row_origin, contact)
       ! To the last digit as in a schedule.
-      if (.not. (allocated(self%births%force) .or. self%parameters%keeps_thresholds)) then
-         stretch = pose%direction * self%parameters%back_force_ratio &
-            & * self%parameters%static_force / self%record(row_stiffness, contact)
-      end if
+      if (.not. (allocated(self%births%force) .or. self%parameters%keeps_thresholds &
+         & .or. self%touches)) stretch = pose%direction &
+         & * self%parameters%back_force_ratio * self%parameters%static_force &
+         & / self%record(row_stiffness, contact)
       self%life(life_clock, contact) = merge(1.0_wp, 2.0_wp, self%direction > 0.0_wp)
       self%life(life_key, contact) = self%breaking_stretch(self%record(row_limit, contact), &
          & self%direction * stretch, self%life(life_left, contact))

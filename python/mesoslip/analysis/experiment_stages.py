@@ -145,6 +145,9 @@ class Experiment:
         self.force: Array = force[:, :count]
         self.drive: Array = self._drive(root)[:count]
         self.displacement: Array = self._displacement(root, count)
+        self.normal_force: Array | None = (
+            root["normal_force"].values[:, :count] if "normal_force" in root else None
+        )
         self.contact_force: Array = (
             root["contact_force"].values[:, :count] if self.is_forced else self.force
         )

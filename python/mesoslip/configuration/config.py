@@ -9,9 +9,9 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Self
+from typing import Annotated, Any, Self
 
-from pydantic import PrivateAttr, ValidationError, model_validator
+from pydantic import Field, PrivateAttr, ValidationError, model_validator
 from pydantic_core import PydanticCustomError
 
 from mesoslip.configuration import arguments, checks
@@ -28,6 +28,7 @@ from mesoslip.configuration.files import (
     parse_toml,
     read_toml,
 )
+from mesoslip.configuration.load import UNLOADED, Load
 from mesoslip.configuration.messages import problems
 from mesoslip.configuration.reading import PathLike, as_path
 from mesoslip.configuration.run_tables import Curve, Output, Run
@@ -64,6 +65,8 @@ class Config(Table):
     slider: Slider
     contacts: Contacts
     interaction: Interaction | None = None
+    # The method of that name reads a file.
+    normal_load: Annotated[Load | None, Field(alias="load")] = None
     output: Output = Output()
     curve: Curve = Curve()
 
@@ -149,21 +152,32 @@ class Config(Table):
     @cached_property
     def given_contact_keys(self) -> frozenset[str]:
         """Keys of [contacts] that differ from their defaults, and tables that act on contacts."""
-        beside = {name: getattr(self, name) for name in type(self).model_fields}
         return given_keys(
-            self.contacts, {name: one for name, one in beside.items() if name not in OTHER_TABLES}
+            self.contacts,
+            {key: one for key, one in self._tables.items() if key not in OTHER_TABLES},
         )
 
     @property
     def contact_features(self) -> dict[str, Any]:
         """Values of the given keys and tables that not all kinds of contacts answer, by key."""
         keys = sorted(self.given_contact_keys - COMMON_KEYS)
-        return {key: functools.reduce(getattr, key.split("."), self) for key in keys}
+        paths = ((key, key.split(".")) for key in keys)
+        return {
+            key: functools.reduce(getattr, path[1:], self._tables[path[0]]) for key, path in paths
+        }
+
+    @property
+    def _tables(self) -> dict[str, Any]:
+        """Values of all fields by their keys."""
+        fields = type(self).model_fields.items()
+        return {field.alias or name: getattr(self, name) for name, field in fields}
 
     @cached_property
     def contact_kind(self) -> ContactKind:
         """The kind of contacts."""
-        return contact_kind(self.run.engine, self.given_contact_keys, self.interaction)
+        return contact_kind(
+            self.run.engine, self.given_contact_keys, self.interaction, self.pressing
+        )
 
     @property
     def has_master_equation(self) -> bool:
@@ -271,6 +285,16 @@ class Config(Table):
             f"the stages end after {with_unit(length, 's')}: the last one continues for another "
             f"{with_unit(self.duration - length, 's')}, until run.{given}"
         )
+
+    @property
+    def pressing(self) -> Load:
+        """The normal load, also where none is given."""
+        return self.normal_load or UNLOADED
+
+    @property
+    def load_notes(self) -> list[str]:
+        """Messages about a load that ends before the run, or separates all contacts."""
+        return [*self.pressing.notes(self.duration)]
 
     @property
     def unreachable_stop(self) -> str | None:
@@ -415,13 +439,15 @@ class Config(Table):
         rows = "".join(
             f"<tr><th>{html.escape(name)}</th>"
             f"<td style='text-align: left'>{html.escape(_summary(table))}</td></tr>"
-            for name, table in self.model_dump(exclude_none=True, exclude_unset=True).items()
+            for name, table in self.model_dump(
+                exclude_none=True, exclude_unset=True, by_alias=True
+            ).items()
         )
         return f"<table><caption>mesoslip configuration, in SI units</caption>{rows}</table>"
 
     def to_dict(self) -> dict[str, Any]:
         """The configuration as nested tables with plain SI numbers."""
-        return self.model_dump(exclude_none=True)
+        return self.model_dump(exclude_none=True, by_alias=True)
 
     def to_toml(self) -> str:
         """The configuration as the text of a TOML file with plain SI numbers."""

@@ -122,7 +122,7 @@ def changes(config: Config, base: Config) -> list[str]:
 
     Keys that only the base has, and defaults that only the configuration has, are left out.
     """
-    own = by_dotted_key(config.model_dump(exclude_none=True, exclude_defaults=True))
+    own = by_dotted_key(config.model_dump(exclude_none=True, exclude_defaults=True, by_alias=True))
     texts: list[str] = []
     last: list[str] = []
     for key, (value, before) in differences([config, base]):

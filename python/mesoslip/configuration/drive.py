@@ -260,7 +260,7 @@ class History(Table):
         if values.keys() & COLUMNS.keys():
             raise problem("file", "give either a file, or time and displacement")
         try:
-            points = read_history(Path(values["file"]))
+            points = read_history(Path(values["file"]), COLUMNS, "a history of the drive")
         except FileError as error:
             raise problem("file", str(error)) from None
         return {**{key: one for key, one in values.items() if key != "file"}, **points}
@@ -291,15 +291,16 @@ class History(Table):
             yield DrivePart(next_time - time, velocity, velocity, 0)
 
 
-def read_history(path: Path) -> dict[str, list[float]]:
-    """Points of a measured history of the drive [s, m] from a file, see `columns`.
+def read_history(path: Path, columns: Mapping[str, Quantity], what: str) -> dict[str, list[float]]:
+    """Points of a measured history, ``what`` it is, in SI units from a file, see `columns`.
 
-    The first column must be ``time [s]``; ``displacement [um]`` may be any other.
+    The first column must be ``time [s]``; the others may be anywhere.
     """
-    cells = cells_of(text_of(path, "a history of the drive"), str(path))
-    wanted = "the header must name the columns with units, such as time [s],displacement [um]"
-    places = find_columns(cells.first, COLUMNS, str(path)) if cells.has_header else {}
-    for name in COLUMNS:
+    cells = cells_of(text_of(path, what), str(path))
+    header = ",".join(one.header for one in columns.values())
+    wanted = f"the header must name the columns with units, such as {header}"
+    places = find_columns(cells.first, columns, str(path)) if cells.has_header else {}
+    for name in columns:
         if name not in places:
             raise FileError(f"{path}: there is no column {name}; {wanted}")
     if places["time"].column != 0:

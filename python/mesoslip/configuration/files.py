@@ -18,13 +18,18 @@ EXCLUSIVE = {
     "run": ("duration", "drive_displacement"),
     "drive": ("velocity", "stage", "cycle", "history", "force", "force_rate"),
     "cycle": ("velocity", "frequency"),
-    "history": ("file", "time", "displacement"),
+    "history": ("file", "time", "displacement", "normal_force"),
+    "load": ("stage", "cycle", "history"),
     "threshold": ("relative_width", "file", "samples", "weights", "stiffnesses"),
     "slider": ("damping", "damping_ratio"),
 }
 
 # Keys that name a file, relative to the folder of the configuration.
-FILES = (("drive", "history", "file"), ("contacts", "threshold", "file"))
+FILES = (
+    ("drive", "history", "file"),
+    ("load", "history", "file"),
+    ("contacts", "threshold", "file"),
+)
 
 # Files of a chain of bases.
 MAX_BASES = 50

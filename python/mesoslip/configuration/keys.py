@@ -45,10 +45,10 @@ def key_kind(key: str) -> KeyKind | None:
         tables = [
             inner
             for table in tables
-            if name in table.model_fields
-            for inner in tables_in(table.model_fields[name].annotation)
+            if name in table.fields()
+            for inner in tables_in(table.fields()[name].annotation)
         ]
-    fields = [table.model_fields[last] for table in tables if last in table.model_fields]
+    fields = [table.fields()[last] for table in tables if last in table.fields()]
     if not fields:
         return None
     parts = [

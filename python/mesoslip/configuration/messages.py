@@ -77,7 +77,7 @@ def _unknown_key(path: list[Any], slider: str, whole: type[Table]) -> str:
     if table == "slider" and kinds:
         named = " or ".join(f'"{kind}"' for kind in kinds)
         return f"is for slider.kind = {named} only"
-    keys = _table_at(path[:-1], slider, whole).model_fields.keys()
+    keys = _table_at(path[:-1], slider, whole).fields()
     near = difflib.get_close_matches(name, [*keys, *([] if table else ["base"])], 1)
     # The same name in another table is more likely than a similar name.
     elsewhere = sorted({key for key in _all_keys(whole) if key.rpartition(".")[2] == name})
@@ -90,7 +90,7 @@ def _table_at(path: list[Any], slider: str, whole: type[Table]) -> type[Table]:
     table = whole
     for name in path:
         if isinstance(name, str):
-            inner = tables_in(table.model_fields[name].annotation)
+            inner = tables_in(table.fields()[name].annotation)
             table = SLIDERS[slider] if name == "slider" else next(inner)
     return table
 
@@ -102,7 +102,7 @@ def _all_keys(table: type[Table]) -> tuple[str, ...]:
 
 def all_keys(table: type[Table], outer: str = "") -> Iterator[str]:
     """Dotted names of all keys."""
-    for name, field in table.model_fields.items():
+    for name, field in table.fields().items():
         yield outer + name
         for inner in tables_in(field.annotation):
             yield from all_keys(inner, f"{outer}{name}.")

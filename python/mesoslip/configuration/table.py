@@ -16,6 +16,7 @@ from pydantic import (
     StrictStr,
     model_validator,
 )
+from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError, PydanticKnownError
 
 from mesoslip.configuration.units import to_si
@@ -103,6 +104,7 @@ MeasuredLength = Annotated[float, _quantity("m", "3.5 nm", 0.0, 1e9)]
 Density = Annotated[float, _quantity("kg/m^3", "956 kg/m^3", 1e-12, 1e18)]
 Pressure = Annotated[float, _quantity("Pa", "70 GPa", 1e-9, 1e18)]
 Temperature = Annotated[float, _quantity("K", "300 K", 1e-12, 1e9)]
+Angle = Annotated[float, _quantity("rad", "1.57 rad", 0.0, 1e6)]
 Number = Annotated[float, _quantity("1", "0.2", 1e-300, 1e12)]
 Text = Annotated[StrictStr, AfterValidator(_writable)]
 Whole = Annotated[StrictInt, BeforeValidator(_whole)]
@@ -129,6 +131,11 @@ class Table(BaseModel):
         """Whether the table changes what is computed."""
         return True
 
+    @classmethod
+    def fields(cls) -> dict[str, FieldInfo]:
+        """The fields by their keys in a file."""
+        return {field.alias or name: field for name, field in cls.model_fields.items()}
+
     @model_validator(mode="before")
     @classmethod
     def _without_none(cls, values: Any) -> Any:
@@ -138,14 +145,15 @@ class Table(BaseModel):
         return {
             key: value
             for key, value in values.items()
-            if value is not None or key not in cls.model_fields
+            if value is not None or key not in cls.fields()
         }
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
         """A copy; updated values are checked."""
         if not update:
             return super().model_copy(deep=deep)
-        values = {name: getattr(self, name) for name in self.model_fields_set}
+        names = {name: field.alias or name for name, field in type(self).model_fields.items()}
+        values = {names[name]: getattr(self, name) for name in self.model_fields_set}
         return self.model_validate({**values, **update})
 
 

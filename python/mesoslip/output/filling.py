@@ -89,7 +89,7 @@ def block_rows(config: Config, table: str) -> int:
     """Maximum number of rows of a table in memory."""
     width = 1
     if table == "snapshots":
-        width = 3 * config.contacts.count
+        width = 3 * config.contact_kind.site_count(config.contacts)
     elif table == "layers":
         width = config.slider.layer_count
     return max(1, min(BLOCK_ROWS, BLOCK_NUMBERS // width))

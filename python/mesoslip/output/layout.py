@@ -103,6 +103,27 @@ def column(table: str, name: str) -> Pick:
     return lambda rows, _: rows[:, number]
 
 
+def loaded(config: Config, table: str, time: str, force: str) -> dict[str, Pick]:
+    """Normal force, and friction coefficient of the force of a column, at the time of another;
+    nothing without a load."""
+    load = config.pressing
+    if not load.is_known:
+        return {}
+    times, forces = column(table, time), column(table, force)
+
+    def normal(rows: Array, owners: Array) -> Array:
+        return load.force_at(times(rows, owners))
+
+    def friction(rows: Array, owners: Array) -> Array:
+        load_there = normal(rows, owners)
+        # Separated contacts have no coefficient.
+        carries = load_there > 0
+        quotient = forces(rows, owners) / np.where(carries, load_there, 1.0)
+        return np.where(carries, quotient, np.nan)
+
+    return {"normal_force": normal, "friction_coefficient": friction}
+
+
 class _GroupBuilder:
     """Entries of a group, under construction; those of a catalogue come from one table."""
 
@@ -169,6 +190,8 @@ def _root(results: Results) -> GroupLayout:
     for name in recorded(config):
         pick = column("trace", name)
         group.add(name, at_times, has_gaps=has_gaps, table="trace", pick=pick)
+    for name, pick in loaded(config, "trace", "time", "spring_force").items():
+        group.add(name, at_times, has_gaps=has_gaps, table="trace", pick=pick)
     layers = config.slider.layers_recorded(config)
     if layers:
         sizes["layer"] = layers
@@ -190,13 +213,15 @@ def _root(results: Results) -> GroupLayout:
 
 
 def _slips(results: Results) -> GroupLayout:
-    group = _GroupBuilder(results, variables.SLIPS, "slips")
+    group = _GroupBuilder(results, variables.LOADED_SLIPS, "slips")
     before, after = column("slips", "force_before"), column("slips", "force_after")
     for name in variables.SLIPS:
         if name == "force_drop":
             group.add_column(name, lambda rows, owners: before(rows, owners) - after(rows, owners))
         elif name in tables.SLIP_COLUMNS:
             group.add_column(name)
+    for name, pick in loaded(results.config, "slips", "start_time", "force_before").items():
+        group.add_column(name, pick)
     return group.catalogue()
 
 
@@ -213,6 +238,8 @@ def _slip_traces(results: Results) -> GroupLayout:
     group.add_column("sample_time", "time", is_coordinate=True)
     for name in recorded(results.config):
         group.add_column(name)
+    for name, pick in loaded(results.config, "slip_trace", "time", "spring_force").items():
+        group.add_column(name, pick)
     return group.catalogue()
 
 
@@ -276,6 +303,8 @@ def _energy(results: Results) -> GroupLayout:
     group = _GroupBuilder(results, variables.ENERGY)
     for name, values in zip(tables.ENERGY_COLUMNS, terms, strict=True):
         if name == "step_work" and not results.config.contact_kind.step_work_bound > 0:
+            continue
+        if name == "separation_loss" and not results.config.pressing.is_known:
             continue
         if name in variables.ENERGY:
             group.add(name, ("realization",), values=values)

@@ -84,11 +84,16 @@ TRACE = Group(
     base_displacement=Meaning("m", "displacement of the base"),
 )
 
-# Variables of measured traces only. The force of a measured trace is the spring force, or the
-# friction coefficient if the normal force is not known.
-MEASURED = Group(
+# Variables of runs with a load and of measured traces.
+LOADED = Group(
     friction_coefficient=Meaning("1", "friction coefficient"),
     normal_force=Meaning("N", "normal force"),
+)
+
+# The force of a measured trace is the spring force, or the friction coefficient if the normal force
+# is not known.
+MEASURED = Group(
+    LOADED,
     normal_stress=Meaning("Pa", "normal stress"),
 )
 FORCES = ("spring_force", "friction_coefficient")
@@ -139,6 +144,13 @@ SLIPS = Group(
         np.int64,
         is_fractional=True,
     ),
+)
+
+# Slips of runs with a load.
+LOADED_SLIPS = Group(
+    SLIPS,
+    normal_force=Meaning("N", "normal force at the start of the slip"),
+    friction_coefficient=Meaning("1", "friction coefficient at the start of the slip"),
 )
 
 MEASURED_SLIPS = Group(
@@ -197,6 +209,7 @@ MEASURED_STAGES = Group(
 
 SLIP_TRACES = Group(
     TRACE,
+    **LOADED,
     realization_index=REALIZATION_INDEX,
     slip=Meaning("1", "number of the slip within its realization, from 0", np.int32),
     sample_time=Meaning("s", "time of the sample", is_regular=True),
@@ -247,6 +260,9 @@ ENERGY = Group(
     birth_gain=Meaning("J", "elastic energy of contacts at their attaching"),
     step_work=Meaning(
         "J", "work on the contact force in steps beyond that on the contacts: the error of steps"
+    ),
+    separation_loss=Meaning(
+        "J", "elastic energy lost by contacts that separate as the normal load falls"
     ),
 )
 

@@ -67,11 +67,12 @@ def check_memory(config: Config, available: float | None = None) -> None:
     in_catalogue = (run.avalanches or 0) if output.avalanche_size is None else 0
     per_sample = BYTES_PER_SAMPLE + BYTES_PER_LAYER * config.slider.layers_recorded(config)
     finer = finer_samples(config)
-    lattices = BYTES_PER_CONTACT_IN_SNAPSHOT * contacts.count * run.realizations
+    sites = config.contact_kind.site_count(contacts)
+    lattices = BYTES_PER_CONTACT_IN_SNAPSHOT * sites * run.realizations
     after = 0.0 if output.snapshot_size is None else _breaks(config) / output.snapshot_size
     problems = []
     samples = config.expected_duration / config.output_interval
-    contact_bytes = config.contact_kind.bytes_per_contact * contacts.count * together
+    contact_bytes = config.contact_kind.bytes_per_contact * sites * together
     for key, needed, value in (
         ("contacts.count", contact_bytes, contacts.count),
         ("run.avalanches", BYTES_PER_AVALANCHE * in_catalogue * run.realizations, run.avalanches),

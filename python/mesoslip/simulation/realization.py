@@ -428,7 +428,7 @@ class Realization(Recorded):
     @property
     def contacts(self) -> dict[str, Array]:
         """Origin [m], stiffness [N/m] (0 if detached), breaking stretch [m] and number of renewals
-        of each of the N contacts.
+        of each of the N contacts; under a load, of each site.
 
         Raises
         ------
@@ -439,9 +439,8 @@ class Realization(Recorded):
             raise RunError(
                 f"realization {self.number}: the run is over; its contacts are no longer in memory"
             )
-        return dict(
-            zip(CONTACT_COLUMNS, self._open().contacts(self.config.contacts.count), strict=True)
-        )
+        sites = self.config.contact_kind.site_count(self.config.contacts)
+        return dict(zip(CONTACT_COLUMNS, self._open().contacts(sites), strict=True))
 
     @property
     def energy_terms(self) -> dict[str, float]:

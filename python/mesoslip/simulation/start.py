@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from mesoslip.configuration.kernel_parameters import Parameters
+from mesoslip.errors import ConfigError, Problem
 from mesoslip.simulation.archive import Archive
 from mesoslip.simulation.kernel import Array, Kernel, Progress, Words
 from mesoslip.simulation.kernel_setup import KernelSetup
@@ -97,6 +98,16 @@ def follow(config: Config, parameters: Parameters, number: int, end: End) -> tup
 
     The configurations may differ in the keys of `CONTINUED`; ``parameters`` are the contacts'.
     """
+    if config.pressing.varies:
+        raise ConfigError(
+            [
+                Problem(
+                    "",
+                    "load",
+                    "must be constant in a run that continues another: its stages start with a run",
+                )
+            ]
+        )
     archive = Archive(end.words)
     slider = archive.section_with("drive part")
     slips = int(archive.number("slips", "slip_count"))

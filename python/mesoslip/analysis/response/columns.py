@@ -60,6 +60,26 @@ STEPS = Group(
     note=_NOTE,
 )
 
+LOAD_STEPS = Group(
+    output_index=_OUTPUT,
+    stage_number=_STAGE,
+    load_step_time=Meaning("s", "time of the step of the normal load"),
+    normal_force_before=Meaning("N", "normal force before the step"),
+    normal_force_after=Meaning("N", "normal force after the step"),
+    force_before=Meaning("N", "steady force before the step"),
+    force_after=Meaning("N", "steady force after the step"),
+    direct_change=Estimate("N", "force just after the step minus steady force before"),
+    transient_change=Estimate("N", "steady force after minus force just after the step"),
+    alpha=Estimate("1", "transient change over the normal force after and ln(L'/L)"),
+    rise_displacement=Meaning(
+        "m", "displacement of the slider until the force first reaches the steady force"
+    ),
+    relaxation_displacement=Estimate(
+        "m", "length of the exponential decay over the slider's displacement"
+    ),
+    note=_NOTE,
+)
+
 HOLDS = Group(
     output_index=_OUTPUT,
     stage_number=_STAGE,

@@ -20,6 +20,7 @@ from mesoslip.analysis.response.columns import (
     FRICTION_LINE,
     HEALING_LINE,
     HOLDS,
+    LOAD_STEPS,
     RAMPS,
     RESTARTS,
     STEADY,
@@ -29,6 +30,7 @@ from mesoslip.analysis.response.columns import (
 from mesoslip.analysis.response.forces import creep_line, creep_rows, friction_line, ramp_rows
 from mesoslip.analysis.response.holds import healing_line, hold_rows
 from mesoslip.analysis.response.line import Line
+from mesoslip.analysis.response.load_steps import load_step_rows
 from mesoslip.analysis.response.restarts import restart_rows
 from mesoslip.analysis.response.steady import steady_line, steady_rows
 from mesoslip.analysis.response.steps import step_rows
@@ -72,7 +74,8 @@ def response(
     xarray.DataTree
         Groups ``steady``: the mean force of each stage at constant velocity, with its error;
         ``steps``: direct change, evolution change and relaxation displacement of each velocity
-        step; ``holds``: relaxation, restart peak and healing of each hold; ``rate_and_state``:
+        step; ``load_steps``: direct and transient change of each step of the normal load, and
+        its alpha; ``holds``: relaxation, restart peak and healing of each hold; ``rate_and_state``:
         a, b, D_c of each law, and whether the law describes the output; ``creep``, ``restarts`` and
         ``ramps``: of a slider under a force, its velocity in each stage of constant force, the time
         to each restart after a smaller force, and the static friction in each stage in which the
@@ -154,6 +157,7 @@ def response_of(
     rows = {
         "steady": [row for number, one in numbered for row in steady_rows(one, number)],
         "steps": [row for number, one in numbered for row in step_rows(one, number)],
+        "load_steps": [row for number, one in numbered for row in load_step_rows(one, number)],
         "holds": [row for number, one in numbered for row in hold_rows(one, number)],
         "creep": [row for number, one in numbered for row in creep_rows(one, number)],
         "restarts": [row for number, one in numbered for row in restart_rows(one, number)],
@@ -169,6 +173,7 @@ def response_of(
     parts = {
         "steady": _part(STEADY, "velocity_stage", rows["steady"], STEADY_LINE, steady_line),
         "steps": _part(STEPS, "step", rows["steps"]),
+        "load_steps": _part(LOAD_STEPS, "load_step", rows["load_steps"]),
         "holds": _part(HOLDS, "hold", rows["holds"], HEALING_LINE, healing_line),
         "rate_and_state": _part(FIT, "fit", fits),
         "creep": _part(CREEP, "force_stage", rows["creep"], CREEP_LINE, creep_line),

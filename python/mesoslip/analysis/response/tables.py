@@ -215,6 +215,19 @@ def _columns(
                 force("overshoot", "overshoot"),
             ),
         ),
+        "load_steps": (
+            "Steps of the normal load",
+            (
+                *stages,
+                _Column("from", "normal_force_before", "N", beside=("normal_force_after",)),
+                _Column("to", "normal_force_after", "N", beside=("normal_force_before",)),
+                force("direct change", "direct_change"),
+                force("transient change", "transient_change"),
+                _Column("alpha", "alpha", "1", "alpha_error"),
+                _Column("rise", "rise_displacement", "m"),
+                length("relaxation", "relaxation_displacement"),
+            ),
+        ),
         "holds": (
             "Holds",
             (

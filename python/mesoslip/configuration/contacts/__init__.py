@@ -17,6 +17,7 @@ from mesoslip.configuration.contacts.thermal import (
     ThermalContacts,
     ThermalPopulations,
 )
+from mesoslip.configuration.load import Load
 
 KINDS: tuple[type[ContactKind], ...] = (
     ThermalAgeingContacts,
@@ -32,14 +33,17 @@ KINDS: tuple[type[ContactKind], ...] = (
 
 
 def contact_kind(
-    engine: str, given: frozenset[str], interaction: Interaction | None
+    engine: str,
+    given: frozenset[str],
+    interaction: Interaction | None,
+    load: Load,
 ) -> ContactKind:
     """The kind of contacts of an engine that answers most of the given keys.
 
     Those that it does not answer are among its problems.
     """
     kinds = [kind for kind in KINDS if kind.engine == engine and kind.features <= given]
-    return max(kinds, key=lambda kind: len(kind.features))(interaction)
+    return max(kinds, key=lambda kind: len(kind.features))(interaction, load)
 
 
 def is_in_both_engines(given: frozenset[str]) -> bool:

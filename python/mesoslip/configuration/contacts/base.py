@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from mesoslip.configuration.contacts.tables import Contacts, Interaction
 from mesoslip.configuration.kernel_parameters import Parameters
+from mesoslip.configuration.load import Load
 from mesoslip.configuration.run_tables import Run
 from mesoslip.configuration.table import Complaint, Complaints, Table
 
@@ -47,6 +48,8 @@ class Setting(Protocol):
     def contacts(self) -> Contacts: ...
     @property
     def interaction(self) -> Interaction | None: ...
+    @property
+    def pressing(self) -> Load: ...
     @property
     def slider(self) -> Block: ...
     @property
@@ -88,7 +91,7 @@ class ContactKind(ABC):
     kernel_kind: ClassVar[str]
     engine: ClassVar[str]
     features: ClassVar[frozenset[str]] = frozenset()
-    options: ClassVar[frozenset[str]] = frozenset({"contacts.renewal", "contacts.track"})
+    options: ClassVar[frozenset[str]] = frozenset({"contacts.renewal", "contacts.track", "load"})
     is_discrete: ClassVar[bool] = True
     has_neighbours: ClassVar[bool] = False
     residual_bound: ClassVar[float] = 1e-9
@@ -97,6 +100,7 @@ class ContactKind(ABC):
     remedy: ClassVar[str] = ""
 
     interaction: Interaction | None
+    load: Load
 
     @property
     @abstractmethod
@@ -106,16 +110,20 @@ class ContactKind(ABC):
     def on_lattice(self) -> bool:
         return self.interaction is not None
 
+    def site_count(self, contacts: Contacts) -> int:
+        """Number of sites of contacts: that of contacts at the maximum of the load."""
+        return self.load.site_count(contacts.count)
+
     def dimensions(self, contacts: Contacts) -> dict[str, int]:
         """Dimensions of the contacts in outputs, and their lengths."""
         if self.interaction is None:
-            return {"contact": contacts.count}
+            return {"contact": self.site_count(contacts)}
         return {"row": self.interaction.rows, "column": self.interaction.columns}
 
     def positions(self, contacts: Contacts) -> dict[str, Array]:
         """Coordinates of the contacts in outputs, with the shape of their dimensions; in m."""
         if self.interaction is None:
-            return {"contact": np.arange(contacts.count)}
+            return {"contact": np.arange(self.site_count(contacts))}
         assert contacts.area is not None
         spacing = np.sqrt(contacts.area / contacts.count)
         x, y = self.interaction.sites
@@ -137,6 +145,13 @@ class ContactKind(ABC):
         """The combinations that this kind refuses, and the given keys that it does not answer."""
         complaints = list(self._problems(config))
         yield from complaints
+        if self.interaction is not None and "load" in given:
+            yield Complaint(
+                "load",
+                "must be constant, with normal_force alone, beside [interaction]: contacts on a "
+                "lattice have no heights at which they separate",
+            )
+            given -= {"load"}
         for key in sorted(given - COMMON_KEYS - self.features - self.options):
             if not any(f"{one.key}.".startswith(f"{key}.") for one in complaints):
                 yield Complaint(
@@ -164,7 +179,8 @@ def common_parameters(config: Setting) -> Parameters:
     contacts = config.contacts
     ignores_delay = config.slider.ignores_delay
     return {
-        "count": contacts.count,
+        "count": config.pressing.site_count(contacts.count),
+        **config.pressing.kernel_parameters(contacts.count),
         "static_force": contacts.contact_static_force,
         "stiffness": contacts.contact_stiffness,
         "drag": 0.0 if ignores_delay else contacts.contact_drag,

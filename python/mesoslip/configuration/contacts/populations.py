@@ -22,7 +22,7 @@ class PopulationContacts(ContactKind):
     is_discrete: ClassVar[bool] = False
     on_lattice: ClassVar[bool] = False
     bytes_per_contact: ClassVar[int] = 0
-    options: ClassVar[frozenset[str]] = frozenset({"contacts.track"})
+    options: ClassVar[frozenset[str]] = frozenset({"contacts.track", "load"})
     residual_bound: ClassVar[float] = 1e-6
     step_work_bound: ClassVar[float] = 1e-3
     force_error_bound: ClassVar[float] = 0.02

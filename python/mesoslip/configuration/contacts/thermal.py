@@ -131,7 +131,7 @@ class ThermalPopulations(PopulationContacts):
 
     kernel_kind: ClassVar[str] = "thermal populations"
     features: ClassVar[frozenset[str]] = frozenset({"contacts.thermal"})
-    options: ClassVar[frozenset[str]] = frozenset()
+    options: ClassVar[frozenset[str]] = frozenset({"load"})
     # A slider that hardly oscillates is taken to creep: what energy it oscillates with is lost.
     residual_bound: ClassVar[float] = 1e-5
 

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, ClassVar, NoReturn
 
 from mesoslip.errors import ConfigError, Problem
+from mesoslip.quantities import with_unit
 from mesoslip.theory.quantity import Quantity
 
 if TYPE_CHECKING:
@@ -22,7 +23,7 @@ KNOWN_KEYS = frozenset(
         *("drag", "drag_rate", "delay", "delay_law", "back_force_ratio", "newborn_width"),
         *("coupling", "initial", "reattach", "threshold"),
     )
-)
+) | {"load"}
 
 
 class ContactTheory:
@@ -35,15 +36,24 @@ class ContactTheory:
     ----------
     features
         Keys and tables beyond the known ones that the theory accounts for.
-    caveat
+    kind_caveat
         What results leave out; empty if nothing.
     """
 
     features: ClassVar[frozenset[str]] = frozenset()
-    caveat: ClassVar[str] = ""
+    kind_caveat: ClassVar[str] = ""
 
     def __init__(self, config: Config) -> None:
         self.config = config
+
+    @property
+    def caveat(self) -> str:
+        """What results leave out; empty if nothing."""
+        load = self.config.pressing
+        if not load.acts:
+            return self.kind_caveat
+        given = f"computed at the constant normal force {with_unit(load.normal_force, 'N')}"
+        return ". ".join(one for one in (self.kind_caveat, given) if one)
 
     @property
     def depends_on_velocity(self) -> bool:

@@ -21,7 +21,9 @@ class LatticeTheory(PlainTheory):
     """Contacts on a lattice (S25 to S27), whose force curve is known without interaction only."""
 
     features: ClassVar[frozenset[str]] = frozenset({"interaction"})
-    caveat: ClassVar[str] = "computed without [interaction]: the master equation has no neighbours"
+    kind_caveat: ClassVar[str] = (
+        "computed without [interaction]: the master equation has no neighbours"
+    )
 
     def sliding(self, velocity: float | None = None) -> LinearStability:
         return ContactTheory.sliding(self, velocity)

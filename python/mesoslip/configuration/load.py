@@ -1,0 +1,287 @@
+"""The normal load: its table in a file, and the share of the sites that it brings into contact.
+
+More load means more contacts, not stronger ones: N L/L_0 of them at the load L. It is linear in
+each of some parts, and may jump between them, or oscillates about L_0.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator, Mapping
+from functools import cached_property
+from pathlib import Path
+from typing import Annotated, Any, NamedTuple, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydantic import Field, model_validator
+
+from mesoslip.configuration.columns import Quantity
+from mesoslip.configuration.drive import MAX_PARTS, read_history
+from mesoslip.configuration.kernel_parameters import Parameters
+from mesoslip.configuration.table import (
+    Angle,
+    Force,
+    MeasuredTime,
+    Rate,
+    SignedForce,
+    Table,
+    Text,
+    Time,
+    problem,
+)
+from mesoslip.errors import FileError
+from mesoslip.quantities import with_unit
+
+Array = NDArray[np.float64]
+
+# Columns of a measured history.
+COLUMNS = {
+    "time": Quantity("time", "s", "time [s]"),
+    "normal_force": Quantity("normal_force", "N", "normal force [N]"),
+}
+# End of the last part, which has none.
+NEVER = 1e300
+# Part of a site that rounding may add.
+TINY_SITE = 1e-9
+
+
+class LoadPart(NamedTuple):
+    """A part of the load: duration [s], normal force at start and end [N]."""
+
+    duration: float
+    start_force: float
+    end_force: float
+
+
+class LoadStage(Table):
+    """A stage of the load: a constant force, or a ramp from one force to another."""
+
+    duration: Annotated[Time, Field(gt=0)]
+    """Duration of the stage."""
+    normal_force: SignedForce | None = None
+    """Normal force in the stage; 0 separates all contacts."""
+    start_normal_force: SignedForce | None = None
+    """Normal force at the start of a ramp."""
+    end_normal_force: SignedForce | None = None
+    """Normal force at the end of a ramp."""
+
+    @model_validator(mode="after")
+    def _is_one_force(self) -> Self:
+        ends = (self.start_normal_force, self.end_normal_force)
+        if (self.normal_force is None) == (ends == (None, None)):
+            raise problem(
+                "normal_force",
+                "give either this, or start_normal_force with end_normal_force for a ramp",
+            )
+        for key, one in zip(("start_normal_force", "end_normal_force"), ends, strict=True):
+            if self.normal_force is None and one is None:
+                raise problem(key, "missing; a ramp has start_normal_force and end_normal_force")
+        return self
+
+    def part(self) -> LoadPart:
+        """The stage as a part of the load."""
+        if self.normal_force is not None:
+            return LoadPart(self.duration, self.normal_force, self.normal_force)
+        return LoadPart(self.duration, self.start_normal_force or 0.0, self.end_normal_force or 0.0)
+
+
+class LoadCycle(Table):
+    """A vibrating load, L_0 + amplitude × sin(2π frequency × time + phase)."""
+
+    amplitude: Annotated[Force, Field(gt=0)]
+    """Amplitude, up to the mean normal force."""
+    frequency: Annotated[Rate, Field(gt=0)]
+    """Cycles per second."""
+    phase: Angle = 0.0
+    """Phase at the start of the run [rad]."""
+
+
+class LoadHistory(Table):
+    """A measured history of the load, with straight lines between its points, from the first of
+    them on. Outputs keep the points, not the name of the file."""
+
+    file: Text | None = None
+    """A CSV file with the columns time and normal force, relative to the configuration."""
+    time: tuple[MeasuredTime, ...] | None = None
+    """Times of the points, instead of a file."""
+    normal_force: tuple[SignedForce, ...] | None = None
+    """Normal forces at these times."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read(cls, values: Any) -> Any:
+        if not isinstance(values, Mapping) or not isinstance(values.get("file"), str):
+            return values
+        if values.keys() & COLUMNS.keys():
+            raise problem("file", "give either a file, or time and normal_force")
+        try:
+            points = read_history(Path(values["file"]), COLUMNS, "a history of the load")
+        except FileError as error:
+            raise problem("file", str(error)) from None
+        return {**{key: one for key, one in values.items() if key != "file"}, **points}
+
+    @model_validator(mode="after")
+    def _has_points(self) -> Self:
+        if self.time is None or self.normal_force is None:
+            raise problem("file", "missing; give a file, or time and normal_force")
+        if len(self.time) != len(self.normal_force):
+            raise problem("normal_force", "must have as many values as time")
+        if not 2 <= len(self.time) <= MAX_PARTS:
+            raise problem("time", f"must have from 2 to {MAX_PARTS} values")
+        for before, after in itertools.pairwise(self.time):
+            if not after > before:
+                raise problem("time", f"must increase; {after:g} s comes after {before:g} s")
+        return self
+
+    def parts(self) -> Iterator[LoadPart]:
+        """The straight lines between the points."""
+        points = zip(self.time or (), self.normal_force or (), strict=True)
+        for (time, force), (next_time, next_force) in itertools.pairwise(points):
+            yield LoadPart(next_time - time, force, next_force)
+
+
+class Load(Table):
+    """The normal load. It changes the number of contacts, which is `contacts.count` at the
+    reference `normal_force`; without stages, a cycle or a history it is that throughout."""
+
+    normal_force: Annotated[Force, Field(gt=0)]
+    """Normal force L_0 at which `contacts.count` contacts carry."""
+    stage: tuple[LoadStage, ...] | None = None
+    """Successive stages, as `[[load.stage]]` tables; the last force holds until the run ends."""
+    cycle: LoadCycle | None = None
+    """A vibrating load."""
+    history: LoadHistory | None = None
+    """A measured history; the last force holds until the run ends."""
+
+    @model_validator(mode="after")
+    def _is_one_load(self) -> Self:
+        given = [self.stage, self.cycle, self.history]
+        if given.count(None) < len(given) - 1:
+            raise problem(
+                "stage", "give only one of [[load.stage]], [load.cycle] and [load.history]"
+            )
+        if self.stage is not None and not 1 <= len(self.stage) <= MAX_PARTS:
+            raise problem("stage", f"must have from 1 to {MAX_PARTS} stages")
+        if self.min_force < 0:
+            where = "cycle.amplitude" if self.cycle else "history" if self.history else "stage"
+            raise problem(
+                where,
+                f"lets the normal force fall to {self.min_force:g} N; it must not be below 0, "
+                "where all contacts are separated",
+            )
+        if not self.max_force > 0:
+            raise problem("stage", "must have a normal force above 0 somewhere")
+        return self
+
+    @cached_property
+    def parts(self) -> tuple[LoadPart, ...]:
+        """Parts of stages or a history; empty otherwise."""
+        if self.stage is not None:
+            return tuple(one.part() for one in self.stage)
+        return () if self.history is None else tuple(self.history.parts())
+
+    @property
+    def max_force(self) -> float:
+        """Maximum normal force [N]."""
+        if self.cycle is not None:
+            return self.normal_force + self.cycle.amplitude
+        ends = [max(part.start_force, part.end_force) for part in self.parts]
+        return max(ends, default=self.normal_force)
+
+    @property
+    def min_force(self) -> float:
+        """Minimum normal force [N]."""
+        if self.cycle is not None:
+            return self.normal_force - self.cycle.amplitude
+        ends = [min(part.start_force, part.end_force) for part in self.parts]
+        return min(ends, default=self.normal_force)
+
+    @property
+    def is_known(self) -> bool:
+        """Whether outputs have the normal force."""
+        return True
+
+    @property
+    def varies(self) -> bool:
+        """Whether the load changes in the run."""
+        return self.max_force != self.min_force
+
+    @property
+    def acts(self) -> bool:
+        """Whether contacts are not those without a load: it differs from L_0 at some time."""
+        return self.varies or self.max_force != self.normal_force
+
+    @property
+    def length(self) -> float:
+        """Duration of its parts [s]; infinite without any."""
+        return math.fsum(part.duration for part in self.parts) if self.parts else math.inf
+
+    def site_count(self, count: int) -> int:
+        """Number of contacts at the maximum of the load, given that at L_0."""
+        return max(1, math.ceil(count * (self.max_force / self.normal_force) - TINY_SITE))
+
+    def kernel_parameters(self, count: int) -> Parameters:
+        """Parameters of the load in the kernel, as shares of the sites; none if it is constant."""
+        if not self.varies:
+            return {}
+        full = self.normal_force * self.site_count(count) / count
+        if self.cycle is not None:
+            return {
+                "load_mean": self.normal_force / full,
+                "load_amplitude": min(self.cycle.amplitude, self.normal_force) / full,
+                "load_rate": 2 * math.pi * self.cycle.frequency,
+                "load_phase": self.cycle.phase,
+            }
+        # The last force holds.
+        last = self.parts[-1].end_force
+        parts = (*self.parts, LoadPart(math.inf, last, last))
+        ends = itertools.accumulate(part.duration for part in parts)
+        return {
+            "load_part_end": tuple(min(one, NEVER) for one in ends),
+            "load_start_share": tuple(min(1.0, part.start_force / full) for part in parts),
+            "load_end_share": tuple(min(1.0, part.end_force / full) for part in parts),
+        }
+
+    def notes(self, duration: float) -> Iterator[str]:
+        """Messages about a load that ends before a run of a duration [s], or separates all."""
+        # Durations of stages may be rounded in the file.
+        if 1.01 * self.length < duration < math.inf:
+            last = with_unit(self.parts[-1].end_force, "N")
+            yield (
+                f"the load ends after {with_unit(self.length, 's')}: its last normal force, "
+                f"{last}, holds for another {with_unit(duration - self.length, 's')}"
+            )
+        if self.min_force == 0:
+            yield "the normal force falls to 0, where all contacts are separated"
+
+    def force_at(self, time: ArrayLike) -> Array:
+        """Normal force at times since the start of the run [s], in N; where it jumps, that before
+        the jump, as in samples."""
+        times = np.asarray(time, dtype=float)
+        if self.cycle is not None:
+            angle = 2 * math.pi * self.cycle.frequency * times + self.cycle.phase
+            wave: Array = self.normal_force + self.cycle.amplitude * np.sin(angle)
+            return wave
+        if not self.parts:
+            return np.full_like(times, self.normal_force)
+        durations, first, last = (np.array(one) for one in zip(*self.parts, strict=True))
+        ends = np.array(list(itertools.accumulate(durations)))
+        number = np.minimum(np.searchsorted(ends, times, side="left"), len(ends) - 1)
+        part = 1 - (ends[number] - times) / durations[number]
+        force: Array = first[number] + np.clip(part, 0, 1) * (last[number] - first[number])
+        return np.where(np.isnan(times), np.nan, force)
+
+
+class Unloaded(Load):
+    """No table: contacts are as many as `contacts.count`, whatever presses them."""
+
+    normal_force: float = 1.0
+
+    @property
+    def is_known(self) -> bool:
+        return False
+
+
+UNLOADED = Unloaded()

@@ -17,6 +17,7 @@ import mesoslip
 import numpy as np
 import pytest
 from conftest import ROOT, klein_tables, long
+from jinja2 import Environment
 from kinds import DIFFERENT, KINDS, configuration
 from mesoslip import Config
 from mesoslip.configuration.keys import key_kind
@@ -794,6 +795,8 @@ def test_a_page_is_built_beside_the_pages_that_are_open(monkeypatch):
     monkeypatch.setattr(server, "Page", lambda *_: waited.append(answered.wait(5)))
 
     class Context:
+        id = "first"
+
         async def with_locked_document(self, build):
             await build(document)
 
@@ -807,6 +810,65 @@ def test_a_page_is_built_beside_the_pages_that_are_open(monkeypatch):
 
     asyncio.run(serve())
     assert waited == [True]
+
+
+def test_pages_are_limited_and_idle_ones_make_room(monkeypatch):
+    """Each has its runs; the next one need not wait for those of a program that asks for many."""
+    pytest.importorskip("bokeh")
+    from bokeh.util.token import generate_jwt_token, generate_session_id
+    from mesoslip.explorer import server
+    from tornado.httpclient import AsyncHTTPClient, HTTPRequest
+    from tornado.websocket import websocket_connect
+
+    made, closed = [], []
+
+    class Page:
+        def __init__(self, *_):
+            self.last_change = time.monotonic()
+            made.append(self)
+
+        def close(self):
+            closed.append(self)
+
+    monkeypatch.setattr(server, "Page", Page)
+    monkeypatch.setattr(server, "TEMPLATE", Environment(autoescape=True).from_string("page"))
+
+    async def serve():
+        one = server.make_server(Config.load(KLEIN), KLEIN, 0)
+        one.start()
+        host = f"127.0.0.1:{one.port}"
+        client = AsyncHTTPClient(max_clients=40)
+
+        async def connect():
+            token = generate_jwt_token(generate_session_id())
+            asked = HTTPRequest(f"ws://{host}/ws", headers={"Origin": f"http://{host}"})
+            socket = await websocket_connect(asked, subprotocols=["bokeh", token])
+            await asyncio.wait_for(socket.read_message(), 5)
+            return socket
+
+        # Connections keep their sessions.
+        sockets = [await connect() for _ in range(server.MAX_PAGES + 4)]
+        assert len(made) == server.MAX_PAGES
+        got = await client.fetch(f"http://{host}/", raise_error=False)
+        assert (got.code, got.reason) == (503, server.FULL)
+        made[3].last_change -= 2 * server.IDLE_SECONDS
+        got = await asyncio.gather(
+            *(client.fetch(f"http://{host}/", raise_error=False) for _ in range(10))
+        )
+        assert sorted(answer.code for answer in got) == [200, *9 * [503]]
+        assert closed == [made[3]]
+        await read_to_end(sockets[3])
+        for socket in sockets:
+            socket.close()
+        await asyncio.gather(*(read_to_end(one) for one in sockets if one is not sockets[3]))
+        client.close()
+        one.stop()
+
+    async def read_to_end(socket):
+        while await asyncio.wait_for(socket.read_message(), 5) is not None:
+            pass
+
+    asyncio.run(serve())
 
 
 def test_the_models_of_a_page_are_collected_once(monkeypatch):

@@ -5,6 +5,8 @@ from __future__ import annotations
 import asyncio
 import gc
 import logging
+import time
+import warnings
 import webbrowser
 from collections.abc import Awaitable, Callable
 from importlib.resources import files
@@ -17,6 +19,7 @@ from bokeh.application.handlers import Handler
 from bokeh.document import Document
 from bokeh.server.auth_provider import AuthProvider
 from bokeh.server.server import Server
+from bokeh.server.views.doc_handler import DocHandler
 from bokeh.settings import settings
 from jinja2 import Environment
 from tornado.ioloop import IOLoop
@@ -32,6 +35,11 @@ ADDRESS = "127.0.0.1"
 MORE_PORTS = 20
 # Time after which the runs of a closed tab are stopped [ms].
 UNUSED_MILLISECONDS = 3_000
+# Maximum number of pages, as each has its runs; time without a change after which a page is ended
+# for a new one, if there are so many [s].
+MAX_PAGES = 8
+IDLE_SECONDS = 300.0
+FULL = f"{MAX_PAGES} pages are open, which is the maximum: close one, and load this one again"
 
 # Bokeh compiles the scripts of its widgets and styles its figures in the page. Everything else is
 # refused, and so is everything from other hosts.
@@ -55,14 +63,53 @@ class Pages(Handler):
         super().__init__()
         self._config, self._source, self._trace = config, source, trace
         self._turn = asyncio.Lock()
+        # By session; None while they are built.
+        self._pages: dict[str, Page | None] = {}
+        self._contexts: dict[str, SessionContext] = {}
+
+    @property
+    def has_room(self) -> bool:
+        """Whether there may be one more page; ends one that is idle, if that makes room."""
+        if len(self._pages) < MAX_PAGES:
+            return True
+        now = time.monotonic()
+        idle = {
+            name: now - page.last_change for name, page in self._pages.items() if page is not None
+        }
+        longest = max(idle, key=idle.__getitem__, default="")
+        if not longest or idle[longest] < IDLE_SECONDS:
+            return False
+        self._end(longest)
+        return True
+
+    def _end(self, name: str) -> None:
+        """End a page: its runs now, its session when the connection is closed."""
+        page, context = self._pages.pop(name), self._contexts.pop(name)
+        if page is not None:
+            page.close()
+        session = context.session  # type: ignore[attr-defined]
+        for connection in list(session._subscribed_connections):
+            connection._socket.close(reason="the page was idle, and others were opened")
 
     async def on_session_created(self, session_context: SessionContext) -> None:
+        # A connection may ask for a session without a page.
+        if not self.has_room:
+            raise RunError(FULL)
+        self._pages[session_context.id] = None
+        self._contexts[session_context.id] = session_context
         async with self._turn:
             await session_context.with_locked_document(self._build)
 
+    async def on_session_destroyed(self, session_context: SessionContext) -> None:
+        self._pages.pop(session_context.id, None)
+        self._contexts.pop(session_context.id, None)
+
     async def _build(self, document: Document) -> None:
         document.template = TEMPLATE
-        await asyncio.to_thread(Page, document, self._config, self._source, self._trace)
+        page = await asyncio.to_thread(Page, document, self._config, self._source, self._trace)
+        context = document.session_context
+        if context is not None and context.id in self._pages:
+            self._pages[context.id] = page
 
     def modify_document(self, doc: Document) -> None:
         """Do nothing: the page was built with its session."""
@@ -71,8 +118,9 @@ class Pages(Handler):
 class OnlyHere(AuthProvider):
     """Allows requests of the page itself, under the address of this machine."""
 
-    def __init__(self) -> None:
+    def __init__(self, pages: Pages) -> None:
         self.hosts: set[str] = set()
+        self._pages = pages
         super().__init__()
 
     @property
@@ -95,6 +143,8 @@ class OnlyHere(AuthProvider):
         )
         if not is_allowed:
             raise HTTPError(403)
+        if isinstance(handler, DocHandler) and not self._pages.has_room:
+            raise HTTPError(503, reason=FULL)
         handler.set_header("Content-Security-Policy", POLICY)
         handler.set_header("X-Content-Type-Options", "nosniff")
         # The runs of a page that a browser keeps for its history would continue.
@@ -116,6 +166,8 @@ def serve(
     It starts from a configuration, named by its source on the command line, at the first free port
     from a given one, and may open a browser.
     """
+    # Of connections that end in the midst of a message.
+    warnings.filterwarnings("ignore", r"coroutine .* was never awaited", RuntimeWarning)
     server = make_server(config, source, port, trace)
     address = f"http://{ADDRESS}:{server.port}/"
     report(address)
@@ -144,7 +196,8 @@ def make_server(config: Config, source: str, port: int, trace: Measured | None =
     settings.perform_document_validation = False
 
     for one in [0] if port == 0 else range(port, port + MORE_PORTS):
-        gate = OnlyHere()
+        pages = Pages(config, source, trace)
+        gate = OnlyHere(pages)
         options: dict[str, Any] = {
             "address": ADDRESS,
             "port": one,
@@ -154,7 +207,7 @@ def make_server(config: Config, source: str, port: int, trace: Measured | None =
             "check_unused_sessions_milliseconds": UNUSED_MILLISECONDS // 3,
         }
         try:
-            server = Server({"/": Application(Pages(config, source, trace))}, **options)
+            server = Server({"/": Application(pages)}, **options)
         except OSError:
             continue
         gate.hosts = {f"{name}:{server.port}" for name in (ADDRESS, "localhost")}

@@ -6,6 +6,7 @@ Each piece is a root of its own, which `page.html` places: a change draws only i
 from __future__ import annotations
 
 import html
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
@@ -81,6 +82,8 @@ class Page:
         # the one for which theory was started.
         self._change_count = self._turn = self._shown = self._explained = 0
         self._is_closed = False
+        # Time of the last change by the user [s].
+        self.last_change = time.monotonic()
         self._workers = {
             "run": NewestJob(),
             "limit": NewestJob(),
@@ -187,6 +190,7 @@ class Page:
         """Show the controls, and run the configuration if it can be run; otherwise the run that is
         shown continues. `is_back` means that the last change was taken back, as its run failed."""
         self._change_count += 1
+        self.last_change = time.monotonic()
         with self._together():
             self._show_controls()
             if not self.session.is_runnable:

@@ -248,7 +248,7 @@ tables = {"trace": Rows(1_500_000, 9), "slip_trace": Rows(1_500_000, 10), "slips
 tables["stages"] = Rows(0, 17)
 one = SimpleNamespace(
     rows=tables.get, number=0, time=1.0, ending="", breaks=1, advances=1, kernel_seconds=1.0,
-    energy=np.ones(10), energy_residual=0.0, step_work=0.0, force_error=0.0,
+    energy=np.ones(11), energy_residual=0.0, step_work=0.0, force_error=0.0,
 )
 config = mesoslip.Config.load(sys.argv[1])
 results = SimpleNamespace(config=config, complete=True, wall_seconds=1.0, realizations=[one])

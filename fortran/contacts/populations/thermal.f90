@@ -58,7 +58,7 @@ contains
       self%keeps_order = .true.
       self%activation = activation
       if (self%ages) then
-         self%joining_time = joining_part * min(1.0_wp, resolution) * self%ageing%time
+         self%joining_time = joining_part * resolution * self%ageing%time
          call new_threshold_nodes(self%nodes, self%parameters%law, self%moments(1), self%ageing, &
             & activation%width)
          allocate (self%kept(self%nodes%count, size(self%population, 1)), source=1.0_wp)

@@ -34,7 +34,8 @@ contains
       real(wp) :: force
 
       associate (parameters => self%parameters)
-         force = quiet_part * min(1.0_wp, self%resolution)**2 * parameters%count &
+         ! Also beyond resolution 1, where a coarse run tells the error of another.
+         force = quiet_part * self%resolution**2 * parameters%count &
             & * parameters%static_force * min(1.0_wp, self%pinned%activation%width)
       end associate
    end function quiet_force

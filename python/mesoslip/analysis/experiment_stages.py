@@ -339,7 +339,8 @@ class Experiment:
             return False
         first = self._steady_start(stage)
         loaded = self.stiffness * abs(stage.velocity) * (stage.end - first) * self.force.shape[0]
-        return float(np.abs(data["force_drop"]).sum()) > STICK_SLIP_SHARE * loaded
+        fallen = float(np.abs(data["force_drop"]).sum())
+        return bool(fallen > STICK_SLIP_SHARE * loaded)
 
     def _slips_of(self, stage: Stage) -> tuple[dict[str, Array], Array]:
         """Columns of the slips in the steady part of a stage at constant velocity, and the

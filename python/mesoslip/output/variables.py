@@ -120,7 +120,7 @@ ROOT = Group(
         "s", "estimated error of the time at which a slip starts, maximum over all slips"
     ),
     energy_residual=Meaning(
-        "1", "residual of the energy balance over the work of the drive, to and fro"
+        "1", "residual of the energy balance over the work of the drive, forth and back"
     ),
     kernel_seconds=Meaning("s", "computing time of the kernel"),
     avalanche_count=Meaning("1", "number of avalanches in the run", np.int64),

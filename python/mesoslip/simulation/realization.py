@@ -407,7 +407,7 @@ class Realization(Recorded):
 
     @property
     def energy_residual(self) -> float:
-        """Residual of the energy balance, relative to the work of the drive, to and fro, or the
+        """Residual of the energy balance, relative to the work of the drive, forth and back, or the
         largest term."""
         return self._part_of_work(self.energy[-1])
 

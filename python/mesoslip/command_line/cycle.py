@@ -98,10 +98,11 @@ def _follow(
     import xarray as xr
 
     from mesoslip.cycles.branch import branches
+    from mesoslip.cycles.cycle import started
     from mesoslip.output import writing
 
     if start is not None:
-        config = config.replace({"contacts.initial": start})
+        config = started(config, start)
     key, values = _values(text)
     with progress_shown(quiet) as progress:
         data = branches(config, key, values, progress=progress)

@@ -421,8 +421,7 @@ class Config(Table):
             If anything in it is wrong.
         """
         old = self.to_dict()
-        base = old if self._base is None else self._base
-        return self._checked(override(Merged(old), (*changes, tables)), "configuration", base)
+        return self._checked(override(Merged(old), (*changes, tables)), "configuration", old)
 
     @property
     def own_title(self) -> str | None:

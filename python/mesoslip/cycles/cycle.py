@@ -98,7 +98,7 @@ def cycle(
     """
     checked = master_equation(as_config(config))
     if isinstance(start, str) and start in STARTS:
-        checked = checked.replace({"contacts.initial": start})
+        checked = started(checked, start)
         start = None
     words, level = _start_of(start)
     return settled_cycle(
@@ -212,6 +212,11 @@ def _cycle_of(
         section=settled.level,
         _trace=np.concatenate(traces),
     )
+
+
+def started(config: Config, initial: str) -> Config:
+    """The configuration with another initial state of the contacts."""
+    return config.adapted(lambda one: one.replace({"contacts.initial": initial}))
 
 
 def master_equation(config: Config) -> Config:

@@ -122,7 +122,7 @@ subroutine ask_energy(handle, energy, status, message)
    implicit none
    integer(8), intent(in) :: handle(2)
    !> Terms in the order of the list of names "energy" [J]
-   real(8), intent(out) :: energy(10)
+   real(8), intent(out) :: energy(11)
    integer, intent(out) :: status
    character(len=200), intent(out) :: message
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from mesoslip.configuration.config import Config
-from mesoslip.configuration.files import Change, base_of, on_base, override, read_toml
+from mesoslip.configuration.files import Change, on_base, override, read_toml
 from mesoslip.configuration.keys import KeyKind, key_kind, nearest_keys
 from mesoslip.configuration.units import to_si
 from mesoslip.errors import ConfigError, Problem
@@ -68,8 +68,8 @@ class Plan:
         Known properties of the apparatus according to the traces replace missing keys.
         """
         path = Path(path)
-        base = base_of(path)
-        return cls._checked(override(read_toml(path), overrides).tables, str(path), known, base)
+        merged = read_toml(path)
+        return cls._checked(override(merged, overrides).tables, str(path), known, merged.base)
 
     @classmethod
     def from_dict(

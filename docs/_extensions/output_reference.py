@@ -91,6 +91,12 @@ GROUPS: tuple[tuple[str, Group, str], ...] = (
         "The densities at the displacements of `curve.density_at`.",
     ),
     (
+        "mesoslip curve: group track",
+        variables.TRACK_RESPONSE,
+        "With `contacts.track`: the linear response of slow sliding, over `wavenumber`. Attribute: "
+        "`force_deviation` [N], the standard deviation of the force along the track.",
+    ),
+    (
         "mesoslip curve of contacts that age or creep: root",
         variables.STEADY,
         "Dimension `velocity`: [steady sliding](../../steady-sliding.md) over velocity; the "

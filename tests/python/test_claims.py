@@ -185,6 +185,15 @@ def test_claims_of_avalanches_and_of_two_motions():
         assert judged("C24", one_motion) is expected
 
 
+def test_claims_of_kept_thresholds():
+    kept, drawn = (
+        simulated(name, "run.realizations=1", "contacts.count=2000", "output.interval=0.3ms")
+        for name in ("loops-keep", "loops-redraw")
+    )
+    assert judged("C28", kept, drawn) is Verdict.HOLDS
+    assert judged("C28", drawn, kept) is Verdict.FAILS
+
+
 def test_a_viscous_film_is_judged_by_durations_and_drops():
     short = ["run.realizations=2", "contacts.count=500", "run.duration=2.4s"]
     thin, thick = (simulated(f"drag-{one}", *short) for one in ("2e11", "2e16"))

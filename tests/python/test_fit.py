@@ -610,6 +610,29 @@ def test_a_trace_without_noise_is_given_some():
     assert np.std(added) == pytest.approx(deviation, rel=0.1)
 
 
+def test_a_free_track_is_another_one_in_each_trace_and_simulation():
+    """Spread and length may be free; simulations of one number repeat, all others differ."""
+    track = {
+        "contacts.track.spread": {"from": 0.05, "to": 0.4, "prior": "logarithmic"},
+        "contacts.track.length": {"from": "20 nm", "to": "1 um", "prior": "logarithmic"},
+    }
+    tables = fit_tables(free=track, wander=True)
+    plan = Plan.from_dict(tables)
+    assert plan.prior.keys == (*track, "fit.wander")
+    one = prepare(experiment(), plan)
+    simulator = Simulator((one, one), plan.prior, 3)
+    unit, stop = np.array([0.5, 0.5, 0.0]), Stop(None)
+    first, again = (simulator.forces((7, unit, False), stop) for _ in range(2))
+    other = simulator.forces((8, unit, False), stop)
+    assert np.array_equal(first, again)
+    # Far beyond noise and wander, of which the least is 0.2 %.
+    for changed in (first[1], *other):
+        assert np.std(changed - first[0]) > 0.05 * np.max(first[0])
+    wrong = fit_tables(free=track | {"contacts.track.length": {"from": "0.1 nm", "to": "1 um"}})
+    with pytest.raises(ConfigError, match="contacts.track.length.from.*at least"):
+        Plan.from_dict(wrong)
+
+
 def test_without_emcee_it_is_reported_before_anything_is_simulated(monkeypatch):
     monkeypatch.setattr("mesoslip.inference.sampler.find_spec", lambda _: None)
     with pytest.raises(mesoslip.RunError, match="needs the package emcee"):

@@ -17,6 +17,17 @@ CORRELATIONS = {
 }
 
 
+# A ramp up and a step down.
+LOAD = {
+    "normal_force": 1.0,
+    "stage": [
+        {"duration": 2.0, "start_normal_force": 1.0, "end_normal_force": 1.6},
+        {"duration": 1.0, "normal_force": 1.6},
+        {"duration": 3.0, "normal_force": 0.7},
+    ],
+}
+
+
 def unit_tables(**changes):
     """Contacts with f_s = k = 1 under a slider that moves at the velocity 1; keys of [contacts]."""
     contacts = {
@@ -170,8 +181,9 @@ def test_forces_vary_along_the_track_as_the_linear_theory_says():
             },
         },
         {"contacts.initial": "steady", "contacts.back_force_ratio": 0.2},
+        {"load": LOAD, "contacts.back_force_ratio": 0.2},
     ],
-    ids=["equal", "scaled", "weak places", "newborn width", "log", "relax", "steady"],
+    ids=["equal", "scaled", "weak places", "newborn width", "log", "relax", "steady", "load"],
 )
 def test_both_engines_feel_the_same_track(changes):
     count = 20_000

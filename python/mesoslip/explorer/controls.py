@@ -276,7 +276,13 @@ CONTROLS = (
         choices=(NONE, "spread"),
         choice_labels={NONE: "uniform", "spread": "varies"},
         # The length is the breaking stretch, see `derived_value`.
-        required={"spread": {"contacts.track.spread": "0.1", "contacts.track.length": ""}},
+        required={
+            "spread": {
+                "contacts.track.spread": "0.1",
+                "contacts.track.length": "",
+                "contacts.track.correlation": "gaussian",
+            }
+        },
         is_switch=True,
     ),
     Control("contacts.track.spread", "spread w", range=(0.01, 0.5)),

@@ -23,7 +23,7 @@ class LatticeContacts(ContactKind):
     engine: ClassVar[str] = "eq"
     has_neighbours: ClassVar[bool] = True
     features: ClassVar[frozenset[str]] = frozenset({"interaction"})
-    options: ClassVar[frozenset[str]] = frozenset()
+    options: ClassVar[frozenset[str]] = frozenset({"contacts.renewal", "contacts.track"})
     bytes_per_contact: ClassVar[int] = 236
 
     interaction: Interaction

@@ -5,7 +5,7 @@ from __future__ import annotations
 import mesoslip
 import numpy as np
 import pytest
-from conftest import klein_tables
+from conftest import klein_tables, long
 from mesoslip import Config, ConfigError, ThresholdLaw
 from mesoslip.theory.contacts import contact_theory
 from mesoslip.theory.contacts.plain_sliding import SteadySliding
@@ -209,7 +209,7 @@ def two_peaks(number: int, seed: int) -> dict[str, object]:
 
 
 # K* over Nk by cells of the law itself, of 4000 cells of equal width.
-@pytest.mark.parametrize(("back", "exact"), [(0.0, 4.606), (0.2, 4.022)])
+@pytest.mark.parametrize(("back", "exact"), [long(0.0, 4.606), (0.2, 4.022)])
 def test_the_critical_stiffness_of_samples_is_that_of_their_law(klein, back, exact):
     """The slope of F needs a density, which the gaps between samples do not give: it was 38.9."""
     config = klein(

@@ -5,18 +5,21 @@ from __future__ import annotations
 import gzip
 import tracemalloc
 import zipfile
+from functools import partial
 
 import h5py
 import measurements
 import mesoslip
+import nptdms
 import numpy as np
 import pytest
 from conftest import ROOT
 from mesoslip.measured.headers import read_header
+from mesoslip.measured.reading.file import READERS, read_file
 from mesoslip.measured.sampling import in_order, sampling_report, sampling_summary
 from mesoslip.measured.trace import understand
 from mesoslip.measured.units import size_of
-from scipy.io import savemat
+from scipy.io import netcdf_file, savemat
 
 ROWS = "".join(f"{0.01 * n:.2f}\t{3 + np.sin(n):.6f}\n" for n in range(60))
 
@@ -94,6 +97,53 @@ def test_samples_that_continue_their_neighbours_are_numbers(tmp_path):
     record = record_of(tmp_path / "a.txt", "time_s\tforce_N\n" + "".join(rows))
     assert len(record.force) == 397
     assert "-999 taken as missing in 3 lines" in "\n".join(record.report)
+
+
+def write_hdf5(path, columns, userblock=0):
+    with h5py.File(path, "w", userblock_size=userblock) as file:
+        file.update(columns)
+    if userblock:
+        with path.open("r+b") as file:
+            file.write(b"MATLAB 7.3 MAT-file")
+
+
+def write_netcdf(path, columns, version):
+    with netcdf_file(path, "w", version=version) as file:
+        file.createDimension("row", 60)
+        for name, values in columns.items():
+            file.createVariable(name, "f8", ("row",))[:] = values
+
+
+def write_tdms(path, columns):
+    with nptdms.TdmsWriter(path) as file:
+        file.write_segment([nptdms.ChannelObject("", *one) for one in columns.items()])
+
+
+WRITERS = {
+    b"TDSm": write_tdms,
+    b"PK\x03\x04": lambda path, columns: np.savez(path, **columns),
+    b"\x93NUMPY": lambda path, columns: np.save(
+        path, np.rec.fromarrays([*columns.values()], names=[*columns])
+    ),
+    b"MATLAB 5.0": savemat,
+    b"MATLAB 7.3": partial(write_hdf5, userblock=512),
+    b"\x89HDF\r\n\x1a\n": write_hdf5,
+    b"CDF\x01": partial(write_netcdf, version=1),
+    b"CDF\x02": partial(write_netcdf, version=2),
+}
+
+
+@pytest.mark.parametrize("reader", READERS, ids=lambda one: one.kind)
+def test_every_format_is_read(tmp_path, reader):
+    """By the reader that its first bytes choose, whatever the name of the file ends with."""
+    columns = {"time_s": 0.01 * np.arange(60), "force_N": 3 + np.sin(np.arange(60))}
+    stem = tmp_path / "run.npy" if reader.kind == "NumPy (.npy)" else tmp_path / "run.npz"
+    WRITERS[reader.start](stem, columns)
+    path = stem.rename(tmp_path / "run.data")
+    assert path.read_bytes().startswith(reader.start)
+    record = understand(path).record
+    np.testing.assert_allclose(record.force, columns["force_N"])
+    assert f"{reader.kind}: 2 columns" in " ".join(read_file(path).notes)
 
 
 def test_data_sets_take_bounded_memory(tmp_path, monkeypatch):

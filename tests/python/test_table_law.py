@@ -7,7 +7,7 @@ from pathlib import Path
 import mesoslip
 import numpy as np
 import pytest
-from conftest import klein_tables
+from conftest import klein_tables, long
 from mesoslip import Config, ConfigError, ThresholdLaw
 from mesoslip.theory.contacts import contact_theory
 from mesoslip.theory.contacts.plain_sliding import SteadySliding
@@ -211,7 +211,7 @@ def two_peaks(number: int, seed: int) -> dict[str, object]:
 
 
 # K* over Nk by cells of the law itself, of 4000 cells of equal width.
-@pytest.mark.parametrize(("back", "exact"), [(0.0, 4.606), (0.2, 4.022)])
+@pytest.mark.parametrize(("back", "exact"), [long(0.0, 4.606), (0.2, 4.022)])
 def test_the_critical_stiffness_of_samples_is_that_of_their_law(klein, back, exact):
     """The slope of F needs a density, which the gaps between samples do not give: it was 38.9."""
     config = klein(
@@ -240,18 +240,24 @@ def test_the_force_of_many_samples_becomes_that_of_steady_sliding(klein):
     assert curve.force(curve.samples[-1]) == pytest.approx(curve.steady_force, rel=5e-3)
 
 
-def test_samples_have_no_derivatives_of_a_density(klein):
-    config = klein(contacts__threshold=two_peaks(500, seed=2), curve={"length": 3e-8})
-    summary = ForceCurve(config).summary()
+@pytest.fixture(scope="module")
+def few_samples():
+    """The force curve of some samples of two peaks."""
+    law = two_peaks(300, seed=2)
+    tables = klein_tables(contacts__threshold=law, curve={"length": 3e-8})
+    return ForceCurve(Config.from_dict(tables))
+
+
+def test_samples_have_no_derivatives_of_a_density(few_samples):
+    summary = few_samples.summary()
     assert summary["X_c"] is not None
     assert summary["D2"] is None
     assert summary["D3"] is None
     with pytest.raises(ConfigError, match="samples do not give"):
-        mesoslip.onset(config)
+        mesoslip.onset(few_samples.config)
 
 
-def test_a_spring_within_the_error_of_the_critical_stiffness_is_left_open(klein):
-    config = klein(contacts__threshold=two_peaks(500, seed=2), curve={"length": 3e-8})
-    near = config.replace({"slider.stiffness": 1.01 * ForceCurve(config).K_star[0]})
+def test_a_spring_within_the_error_of_the_critical_stiffness_is_left_open(few_samples):
+    near = few_samples.config.replace({"slider.stiffness": 1.01 * few_samples.K_star[0]})
     assert "less than the error of K*" in ForceCurve(near).verdict
-    assert "less than the error of K*" not in ForceCurve(config).verdict
+    assert "less than the error of K*" not in few_samples.verdict

@@ -65,7 +65,7 @@ LIKE = {
 MEANINGS = {name: quantity for quantity, names in NAMES.items() for name in names.split("|")}
 
 # Names whose quantity is that of their unit.
-BY_UNIT = {
+NAMED_BY_UNIT = {
     "friction": ("force", "shear_stress"),
     "shear": ("force", "shear_stress"),
     "normal": ("normal_force", "normal_stress"),
@@ -99,9 +99,9 @@ def meaning_of(name: str) -> str | None:
     return MEANINGS.get(bare) or MEANINGS.get(re.sub(r" ?\d$", "", bare) if bare[:-1] else "")
 
 
-def _by_unit(name: str, unit: str) -> str | None:
+def _named_by_unit(name: str, unit: str) -> str | None:
     """The quantity of a name of which the unit says whether it is a force or a stress."""
-    known = BY_UNIT.get(name_of(name), ())
+    known = NAMED_BY_UNIT.get(name_of(name), ())
     return next((one for one in known if _fits(unit, one)), None)
 
 
@@ -144,7 +144,9 @@ def _read(header: str, unit: str) -> Heading:
     text = header.strip(" \"'")
     unit = unit.strip("[](){}<> ")
     if unit:
-        quantity = _by_unit(text, unit) or meaning_of(_without_brackets(text)) or meaning_of(text)
+        quantity = (
+            _named_by_unit(text, unit) or meaning_of(_without_brackets(text)) or meaning_of(text)
+        )
         return Heading(quantity, unit)
     # Either a force in newtons, or a normal force without a unit.
     if re.fullmatch(r"(?i)f_?n", text):
@@ -160,7 +162,7 @@ def _read(header: str, unit: str) -> Heading:
             "friction", None, f"{text!r} taken as force over normal force, not as newtons"
         )
     for name, named in _divided(text):
-        quantity = _by_unit(name, named) or meaning_of(name)
+        quantity = _named_by_unit(name, named) or meaning_of(name)
         if quantity is not None and (named == "" or _fits(named, quantity)):
             return Heading(quantity, named or None)
     for name, named in _divided(text):

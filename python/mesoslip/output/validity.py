@@ -135,7 +135,7 @@ def _wrong_rows(tree: Tree) -> list[str]:
             continue
         if group and "realization" not in tree.sizes:
             return [f"dimension realization, of rows in {group}, is missing"]
-        dimension = data[name].dims[0]
+        dimension = str(data[name].dims[0])
         names = [one for one in (name, end, *(["realization_index"] * bool(group))) if one in data]
         for start in range(0, data.sizes[dimension], MAX_ROWS):
             # The last row of the block before is compared with the first one of this block.

@@ -122,7 +122,8 @@ def steady_method(tree: xr.DataTree, config: Config) -> Iterator[str]:
     yield from _contacts(config)
     yield slider_sentence(config.slider)
     if "velocity" in tree.coords:
-        ends = (quantity(float(one), "m/s") for one in tree["velocity"].values[[0, -1]])
+        velocities = tree.to_dataset()["velocity"].values
+        ends = (quantity(float(one), "m/s") for one in velocities[[0, -1]])
         yield f"Velocities are from {' to '.join(ends)}."
 
 

@@ -107,6 +107,14 @@ FURTHER: dict[str, dict[str, Any]] = {
     "rigid-load": SLIDERS["rigid"] | LOAD,
     "prescribed-vibrating-load": SLIDERS["prescribed"]
     | {"load": {"normal_force": 1.0, "cycle": {"amplitude": 0.4, "frequency": 200.0}}},
+    "rigid-track": SLIDERS["rigid"] | {"contacts__track": {"spread": 0.2, "length": 5e-9}},
+    "prescribed-ageing-track": SLIDERS["prescribed"]
+    | CONTACTS["ageing"]
+    | {"contacts__track": {"spread": 0.2, "length": 5e-9, "correlation": "exponential"}},
+}
+# The same of contacts one by one.
+INDIVIDUAL: dict[str, dict[str, Any]] = {
+    "eq-rigid-keep": SLIDERS["rigid"] | {"contacts__renewal": "keep"},
 }
 
 Case = Callable[[], xr.DataTree]
@@ -140,6 +148,7 @@ CASES: dict[str, Case] = (
         f"{engine}-{name}": _run(**(_without(COMMON, changes) | ENGINES[engine] | changes))
         for engine, (name, changes) in itertools.product(ENGINES, FURTHER.items())
     }
+    | {name: _run(**(_without(COMMON, changes) | changes)) for name, changes in INDIVIDUAL.items()}
     | {
         f"{function.__name__}-{coupling}": _theory(function, contacts__coupling=coupling)
         for function in (mesoslip.curve, mesoslip.onset)

@@ -629,7 +629,7 @@ def test_a_free_track_is_another_one_in_each_trace_and_simulation():
     for changed in (first[1], *other):
         assert np.std(changed - first[0]) > 0.05 * np.max(first[0])
     wrong = fit_tables(free=track | {"contacts.track.length": {"from": "0.1 nm", "to": "1 um"}})
-    with pytest.raises(ConfigError, match="contacts.track.length.from.*at least"):
+    with pytest.raises(ConfigError, match=r"contacts\.track\.length\.from.*at least"):
         Plan.from_dict(wrong)
 
 

@@ -7,7 +7,7 @@ import math
 import mesoslip
 import numpy as np
 import pytest
-from mesoslip import Config, ConfigError, TrackResponse, track_strength
+from mesoslip import Config, ConfigError, SteadySliding, TrackResponse, track_strength
 from mesoslip.configuration.contacts.tables import Track
 from oracles import relative_strength, stationary_force
 
@@ -241,6 +241,19 @@ def test_wrong_tracks_are_refused(klein):
         with pytest.raises(ConfigError) as raised:
             klein(contacts__track=table, **changes)
         assert all(word in str(raised.value) for word in words), str(raised.value)
+
+
+def test_theories_that_do_not_know_a_track_refuse_it(klein):
+    config = klein(contacts__track={"spread": 0.2, "length": 1e-8}, run__engine="me")
+    for theory in (mesoslip.cycle, SteadySliding):
+        with pytest.raises(ConfigError, match=r"contacts\.track"):
+            theory(config)
+    with pytest.raises(ConfigError, match=r"contacts\.track.*needed"):
+        TrackResponse(klein())
+    with pytest.raises(ConfigError, match=r"contacts\.newborn_width"):
+        TrackResponse(config.replace({"contacts.newborn_width": 0.05}))
+    with pytest.raises(ConfigError, match=r"contacts\.track"):
+        track_strength(klein(), 0.0)
 
 
 def test_a_track_that_is_cut_off_is_reported(klein):

@@ -234,6 +234,10 @@ def _master_equation(config: Config) -> Config:
         problems.append(Problem("", "slider.kind", message, config.slider.kind))
     elif len(config.drive_parts) > 1 or not _is_constant(config):
         problems.append(Problem("", "drive", "a cycle needs one constant velocity, not zero"))
+    if config.contacts.track is not None:
+        problems.append(
+            Problem("", "contacts.track", "has no settled cycle: no two slips are on one place")
+        )
     if not config.contacts.reattach:
         problems.append(
             Problem("", "contacts.reattach", "a cycle needs contacts that attach again")

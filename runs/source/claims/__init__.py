@@ -1,4 +1,4 @@
-"""The source's claims C1 to C24, each judged from outputs of runs.
+"""Claims C1 to C24 of the source, and C26 and C27 of the normal load, judged from outputs of runs.
 
 Adding one is a function in a module of this folder, and its runs in this folder; sweeps that a
 claim needs are in the folder ``sweeps``.

@@ -418,7 +418,7 @@ def test_every_key_is_in_the_reference_with_its_meaning():
     page = configuration_page()
     rows = set(re.findall(r"^\| `(\w+)` \|", page, re.MULTILINE))
     names = {key.rpartition(".")[2] for key in all_keys(Config)}
-    tables = {"run", "drive", "slider", "contacts", "interaction", "output", "curve"}
+    tables = {"run", "drive", "slider", "contacts", "interaction", "load", "output", "curve"}
     assert names - tables <= rows
     assert re.search(r"`delay` \| s \| `0` \| ≥ 0 \| \S", page)
     assert '`"scaled"`, `"equal"`' in page

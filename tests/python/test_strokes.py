@@ -352,3 +352,42 @@ def test_view_and_report_of_strokes() -> None:
     assert section is not None
     assert section.title == "Strokes"
     assert report_section([Subject("made", record_tree(phases(), x + 2))]) is None
+
+
+def test_revolutions_of_a_disc() -> None:
+    """Means of friction that varies with the angle; the angle from a count, a speed or a period."""
+    time = np.arange(0, 12.2, 0.01)
+    force = 2 + 0.5 * np.sin(2 * np.pi * 0.8 * time) + 0.01 * time
+    normal = np.full(time.size, 5.0)
+    trees = [
+        record_tree(time, force, normal_force=normal, revolutions=0.8 * time),
+        record_tree(time, force, normal_force=normal, rotation_speed=np.full(time.size, 0.8)),
+    ]
+    for tree, period in [*((one, None) for one in trees), (record_tree(time, force), 1.25)]:
+        found = mesoslip.strokes(tree, period=period)
+        rows = found["strokes"]
+        assert rows.sizes["stroke"] == 9
+        middle = 0.5 * (rows["start_time"] + rows["end_time"])
+        np.testing.assert_allclose(rows["mean_friction"], 2 + 0.01 * middle, atol=2e-3)
+        assert "125 samples in each" in found.attrs["notes"]
+    np.testing.assert_allclose(
+        mesoslip.strokes(trees[0])["cycles"]["mean_friction_coefficient"], 0.4, atol=0.03
+    )
+    # With a few samples in a revolution, rows are of several.
+    slow = record_tree(time[::25], force[::25], revolutions=0.8 * time[::25])
+    found = mesoslip.strokes(slow)
+    assert "groups of 4 revolutions" in found.attrs["notes"]
+    with pytest.raises(mesoslip.FileError, match="whole revolutions"):
+        mesoslip.strokes(record_tree(time[::300], force[::300], revolutions=0.8 * time[::300]))
+
+
+def test_a_file_of_a_disc(tmp_path) -> None:  # type: ignore[no-untyped-def]
+    """A clock beside a time, forces without unit beside a coefficient, and revolutions."""
+    rows = [f"16:10:{at:02d}\t{at}\t{0.5 * at}\t9,5\t0,{200 + at % 3}" for at in range(60)]
+    header = "Time\tTest Time\tTOTAL REVOLUTIONS\tFriction Force\tFriction Coefficient"
+    file = tmp_path / "disc.txt"
+    file.write_text("\n".join([header, *rows]).replace(".", ","))
+    tree = mesoslip.read_trace(file)
+    assert {"friction_coefficient", "revolutions"} <= set(tree.data_vars)
+    found = mesoslip.strokes(tree)
+    np.testing.assert_allclose(found["cycles"]["mean_friction"], 0.201, atol=1e-3)

@@ -12,6 +12,7 @@ from mesoslip.command_line.options import (
     TableOption,
     print_json,
     print_table,
+    quantity_or_none,
     share,
     write_table,
 )
@@ -34,17 +35,22 @@ def strokes(
             metavar="SHARE",
         ),
     ] = "80%",
+    period: Annotated[
+        str | None,
+        typer.Option(help="Time of a revolution of a disc, such as '0.92 s'", metavar="TIME"),
+    ] = None,
 ) -> None:
-    """Print strokes and cycles of a record that goes back and forth: friction, loops, stiffness."""
+    """Print strokes and cycles of a record that goes back and forth, or revolutions of a disc."""
     from mesoslip.analysis import strokes as analysis
     from mesoslip.output import files, targets
     from mesoslip.output.table_files import latex
 
     part = share(middle, "--middle")
+    time = quantity_or_none(period, "--period", "s", "0.92 s", positive=True)
     if table is not None:
         targets.check_writable(table, [output])
     with files.opened_arrays(output) as tree:
-        found = analysis.strokes_of(tree, part, str(output))
+        found = analysis.strokes_of(tree, part, str(output), period=time)
     write_table(table, lambda: found.tables, found.write_csv)
     if as_json:
         print_json(found.to_json())

@@ -35,6 +35,8 @@ EXAMPLES = {
     "normal_stress": "normal_stress [MPa]",
     "load_point": "load_point [um]",
     "displacement": "displacement [nm]",
+    "revolutions": "revolutions [1]",
+    "rotation_speed": "rotation_speed [rpm]",
 }
 # Other names in the headers of options and tables.
 OTHER_NAMES = {
@@ -296,7 +298,7 @@ def _from_headings(table: Table, headings: Mapping[int, Heading], found: Assignm
         if quantity in found.used or (has_force and quantity in FORCES):
             continue
         if len(indices) > 1:
-            _two(table, quantity, indices, found)
+            _two(table, quantity, indices, headings, found)
         else:
             _use(table, quantity, indices[0], headings[indices[0]], found)
     for index in either:
@@ -305,15 +307,36 @@ def _from_headings(table: Table, headings: Mapping[int, Heading], found: Assignm
         _use_either(table, either[0], headings[either[0]], found)
 
 
-def _two(table: Table, quantity: str, indices: Sequence[int], found: Assignment) -> None:
-    """Refuse two columns of a quantity that is needed; ignore those of others."""
-    headers = " and ".join(shown(table.headers[one]) for one in indices)
-    if quantity in {"time", *FORCES}:
+def _two(
+    table: Table,
+    quantity: str,
+    indices: Sequence[int],
+    headings: Mapping[int, Heading],
+    found: Assignment,
+) -> None:
+    """Use the one column of a quantity that has numbers and a unit; refuse two of a needed one."""
+    usable = []
+    for index in indices:
+        try:
+            if quantity != "time":
+                _size(headings[index].unit or "", quantity, table.headers[index])
+        except ValueError as error:
+            found.unused[index] = str(error)
+        else:
+            if np.isfinite(table.values[index]).any():
+                usable.append(index)
+            else:
+                found.unused[index] = "has no numbers"
+    if len(usable) == 1:
+        _use(table, quantity, usable[0], headings[usable[0]], found)
+        return
+    headers = " and ".join(shown(table.headers[one]) for one in usable)
+    if usable and quantity in {"time", *FORCES}:
         raise FileError(
             f"{table.path}: has two columns of {quantity.replace('_', ' ')}: {headers}; name one "
             f"in [trace.columns], or ignore one in --columns with '{IGNORED}'"
         )
-    for index in indices:
+    for index in usable:
         found.unused[index] = f"two columns of {quantity.replace('_', ' ')}"
 
 

@@ -133,6 +133,10 @@ class Columns(Table):
     """Displacement of the drive (load point)."""
     displacement: ColumnField = None
     """Displacement of the slider."""
+    revolutions: ColumnField = None
+    """Number of revolutions of a disc."""
+    rotation_speed: ColumnField = None
+    """Speed of its rotation, in revolutions per time."""
 
 
 class TraceDescription(Table):

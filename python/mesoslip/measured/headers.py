@@ -18,6 +18,8 @@ QUANTITIES = {
     "normal_stress": "Pa",
     "load_point": "m",
     "displacement": "m",
+    "revolutions": "1",
+    "rotation_speed": "1/s",
 }
 # A displacement, of the load point or of the slider.
 EITHER = "either"
@@ -47,6 +49,10 @@ NAMES = {
     "|translation stage|puller position|driver position|drive disp|shear actuator displacement",
     "displacement": "slider displacement|slider position|block displacement|block position"
     "|sample displacement|slider|fault slip|slip displacement|slip|slider disp",
+    "revolutions": "revolutions|total revolutions|number of revolutions|revolution count|revs"
+    "|turns",
+    "rotation_speed": "rotation speed|rotational speed|speed of rotation|spindle speed"
+    "|rotation frequency|rpm|drehzahl",
     EITHER: "displacement|displ|disp|position|pos|x|distance|travel|horizontal displacement"
     "|shear displacement|weg|deplacement|horizontal disp|shear disp|x position",
 }  # fmt: skip

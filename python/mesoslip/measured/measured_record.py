@@ -21,13 +21,21 @@ from mesoslip.quantities import number, with_unit
 
 MIN_SAMPLES = 4
 # Quantities that a record keeps beside time and force.
-OTHERS = ("load_point", "displacement", "normal_force", "normal_stress")
+OTHERS = (
+    "load_point",
+    "displacement",
+    "normal_force",
+    "normal_stress",
+    "revolutions",
+    "rotation_speed",
+)
 WORDS = {
     "load_point": "load point",
     "displacement": "slider displacement",
     "shear_stress": "shear stress",
     "normal_force": "normal force",
     "normal_stress": "normal stress",
+    "rotation_speed": "rotation speed",
 }
 
 
@@ -60,6 +68,10 @@ class Record:
     """Displacement of the slider."""
     normal_force: Array | None
     normal_stress: Array | None
+    revolutions: Array | None
+    """Number of revolutions of a disc."""
+    rotation_speed: Array | None
+    """Revolutions per second."""
     columns: Sequence[RecordedColumn]
     """All columns of numbers of the file, with the rows that are not used."""
     report: Sequence[str]

@@ -447,6 +447,8 @@ def _tree(
         record.force_name: record.force,
         "normal_force": record.normal_force,
         "normal_stress": record.normal_stress,
+        "revolutions": record.revolutions,
+        "rotation_speed": record.rotation_speed,
     }
     root = {
         name: variables.ROOT.variable(name, ("realization", "time"), values[np.newaxis])

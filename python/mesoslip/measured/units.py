@@ -25,7 +25,7 @@ WORDS = {
     "lbf": "lbf", "lbs": "lbf", "lb": "lbf", "mg": "mg", "t": "t",
     "pascal": "Pa", "pascals": "Pa", "bar": "bar", "bars": "bar", "psi": "psi", "atm": "atm",
     "volt": "V", "volts": "V", "millivolt": "mV", "millivolts": "mV",
-    "hertz": "Hz", "percent": "%", "%": "%",
+    "hertz": "Hz", "percent": "%", "%": "%", "rpm": "rpm",
 }  # fmt: skip
 # Symbols, whose case matters, except those without another meaning.
 SYMBOL = re.compile(r"(?P<prefix>[fpnumckMG]?)(?P<unit>m|s|N|Pa|V|Hz)")
@@ -51,6 +51,7 @@ SIZES = {
     "min": (60.0, "s"),
     "h": (3600.0, "s"),
     "%": (0.01, "1"),
+    "rpm": (1 / 60, "1/s"),
     "V": (1.0, "V"),
     "mV": (1e-3, "V"),
     "uV": (1e-6, "V"),

@@ -95,6 +95,8 @@ LOADED = Group(
 MEASURED = Group(
     LOADED,
     normal_stress=Meaning("Pa", "normal stress"),
+    revolutions=Meaning("1", "number of revolutions of the disc"),
+    rotation_speed=Meaning("s-1", "revolutions of the disc per time"),
 )
 FORCES = ("spring_force", "friction_coefficient")
 

@@ -9,6 +9,7 @@ from mesoslip.analysis.strokes.catalogue import (
     strokes_of,
 )
 from mesoslip.analysis.strokes.friction_map import FrictionMap, along, friction_map, place_of
+from mesoslip.analysis.strokes.revolutions import has_rotation
 from mesoslip.analysis.strokes.segments import (
     Piece,
     back_and_forth,
@@ -30,6 +31,7 @@ __all__ = [
     "check_middle",
     "find_slips_between_reversals",
     "friction_map",
+    "has_rotation",
     "monotone_pieces",
     "output_pieces",
     "pieces_of_force",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +16,7 @@ from mesoslip.analysis.apparatus import apparatus_of
 from mesoslip.analysis.strokes.cycles import Cycle, Overall, cycles_of, overall
 from mesoslip.analysis.strokes.measure import MIDDLE, Measured, Stroke, measure_all
 from mesoslip.analysis.strokes.record import StrokeRecord, record_of
+from mesoslip.analysis.strokes.revolutions import has_rotation, revolutions_of
 from mesoslip.analysis.strokes.variables import CYCLES, STROKES, unit_of
 from mesoslip.errors import ConfigError, FileError, Problem
 from mesoslip.output.arrays import Tree
@@ -183,15 +185,27 @@ def strokes_of(
     middle: float = MIDDLE,
     name: str = "the output",
     realization: int | None = None,
+    period: float | None = None,
 ) -> Strokes:
-    """The strokes of all realizations of an output, or of one."""
+    """The strokes of all realizations of an output, or of one.
+
+    They are revolutions, if those of a disc are recorded or their period [s] is given.
+    """
     unit = apparatus_of(tree, name).force_unit
     chosen = range(tree.sizes.get("realization", 1)) if realization is None else [realization]
-    records = [record_of(tree, index, name) for index in chosen]
-    found = [measure_all(record, middle) for record in records]
+    records, found, cycles = [], [], []
+    for index in chosen:
+        if period is not None or has_rotation(tree):
+            record, own, own_cycles = revolutions_of(tree, index, period, name)
+        else:
+            record = record_of(tree, index, name)
+            own = measure_all(record, middle)
+            own_cycles = cycles_of(record, own)
+        records.append(record)
+        found.append(own)
+        cycles.append(own_cycles)
     if not any(found):
         raise FileError(f"{name}: has no whole stroke with enough samples in its middle")
-    cycles = [cycles_of(record, own) for record, own in zip(records, found, strict=True)]
     means = {key: overall([getattr(one, key) for one in cycles[0]]) for key in OVERALL}
     return Strokes(
         {"strokes": _columns(STROKES, found), "cycles": _columns(CYCLES, cycles)},
@@ -208,8 +222,8 @@ def strokes_of(
 def _notes(record: StrokeRecord, strokes: Sequence[Sequence[Stroke]]) -> Iterator[str]:
     """Sentences on what was found, with guesses."""
     yield (
-        f"strokes by the {record.source}: {len(strokes[0])} whole ones; those at either end of the "
-        "record are left out"
+        f"{record.noun} by the {record.source}: {len(strokes[0])} whole ones; those at either end "
+        "of the record are left out"
     )
     yield from record.notes
     count = sum(not one.slides for own in strokes for one in own)
@@ -251,8 +265,10 @@ def strokes_from(tree: xr.DataTree) -> Strokes:
     return Strokes(columns, {}, tree.attrs["middle"], unit, tree.attrs["source"], notes)
 
 
-def strokes(output: OutputLike, *, middle: float = MIDDLE) -> xr.DataTree:
-    """The strokes of a record that goes back and forth.
+def strokes(
+    output: OutputLike, *, middle: float = MIDDLE, period: float | None = None
+) -> xr.DataTree:
+    """The strokes of a record that goes back and forth, or the revolutions of a disc.
 
     Parts of strokes at either end of the record are left out.
 
@@ -264,6 +280,9 @@ def strokes(output: OutputLike, *, middle: float = MIDDLE) -> xr.DataTree:
         Share of the length of a stroke over which friction is averaged; of the time of a stroke
         where no displacement is known. If the reversal reaches into the middle, it is left out as a
         transient.
+    period
+        Time of a revolution of a disc [s]; by default, revolutions are those of a recorded column
+        of revolutions or of their speed. A row has whole revolutions with at least 20 samples.
 
     Returns
     -------
@@ -287,8 +306,10 @@ def strokes(output: OutputLike, *, middle: float = MIDDLE) -> xr.DataTree:
     import xarray as xr
 
     check_middle("middle", middle)
+    if period is not None and not 0 < period < math.inf:
+        raise ConfigError([Problem("", "period", "must be a time above 0", period)])
     with opened_run_arrays(output) as tree:
-        found = strokes_of(tree, middle)
+        found = strokes_of(tree, middle, period=period)
     groups: dict[str, xr.Dataset] = {}
     for group, meanings, dimension in (("strokes", STROKES, "stroke"), ("cycles", CYCLES, "cycle")):
         variables = {

@@ -123,7 +123,7 @@ def measure(
         start += _transient(along[start:after])
     inside = slice(start if slides else first, after)
     friction = (
-        _mean(record, along[inside])
+        mean_of(record, along[inside])
         if slides
         else _whole_mean(record, position, along, (edge, length - edge), inside)
     )
@@ -191,7 +191,7 @@ def _transient(values: Array) -> int:
     return min(MARGIN * transient(values), int(MAX_DISCARDED * values.size))
 
 
-def _mean(record: StrokeRecord, values: Array) -> Measured:
+def mean_of(record: StrokeRecord, values: Array) -> Measured:
     """Mean of a steady force. Fluctuations beyond the noise may be those of the track."""
     by_noise = record.noise * math.sqrt(record.variance_ratio / values.size)
     found = steady_mean(values[np.newaxis])

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip.analysis.noise import noise_level, without_impulses
-from mesoslip.analysis.strokes.segments import FORCE, Piece, output_pieces
+from mesoslip.analysis.strokes.segments import FORCE, POSITIONS, Piece, output_pieces
 from mesoslip.analysis.strokes.sliding import polarity
 from mesoslip.errors import FileError
 from mesoslip.output.access import group_of
@@ -38,6 +38,10 @@ class StrokeRecord:
     correlated: float
     """That of noise that is correlated from sample to sample."""
     correlation_time: float
+    noun: str = "strokes"
+    """What the pieces are."""
+    remarks: tuple[str, ...] = ()
+    """Sentences on the pieces."""
 
     @cached_property
     def sign(self) -> float:
@@ -60,6 +64,12 @@ class StrokeRecord:
         return (self.white**2 + self.correlated**2 * length) / total
 
     @property
+    def singular(self) -> str:
+        """What a piece is."""
+        first, _, rest = self.noun.partition(" ")
+        return f"{first.removesuffix('s')} {rest}".rstrip()
+
+    @property
     def noise(self) -> float:
         """Standard deviation of all noise of the force."""
         return math.hypot(self.white, self.correlated)
@@ -67,7 +77,7 @@ class StrokeRecord:
     @property
     def notes(self) -> list[str]:
         """Guesses about the record, which may be wrong."""
-        found = []
+        found = list(self.remarks)
         if self.source == FORCE:
             found.append(
                 "guess: strokes are those of the sign of the force, as no displacement is known"
@@ -80,7 +90,6 @@ class StrokeRecord:
 def record_of(tree: Tree, realization: int = 0, name: str = "the output") -> StrokeRecord:
     """A realization of an output as a record of strokes."""
     pieces, source = output_pieces(tree, realization)
-    root = tree.to_dataset()
     if pieces is None:
         raise FileError(
             f"{name}: does not go back and forth: the {source} has no reversals"
@@ -88,6 +97,19 @@ def record_of(tree: Tree, realization: int = 0, name: str = "the output") -> Str
             else f"{name}: does not go back and forth, as far as the sign of the force shows; no "
             "displacement is known"
         )
+    return record_in(tree, realization, pieces, source)
+
+
+def record_in(
+    tree: Tree,
+    realization: int,
+    pieces: tuple[Piece, ...],
+    source: str,
+    noun: str = "strokes",
+    remarks: tuple[str, ...] = (),
+) -> StrokeRecord:
+    """A realization of an output, cut into pieces."""
+    root = tree.to_dataset()
     force = root[next(one for one in FORCES if one in root)].values[realization].astype(float)
     known = np.flatnonzero(np.isfinite(force))
     count = int(known[-1]) + 1
@@ -101,18 +123,16 @@ def record_of(tree: Tree, realization: int = 0, name: str = "the output") -> Str
             for one in ("deviation", "correlated_deviation", "correlation_time")
         )
     position = None
-    if source != FORCE:
-        name = "drive_displacement" if source == "load point" else "displacement"
-        position = _whole(time, root[name].values[realization][:count])
+    if source in POSITIONS:
+        position = _whole(time, root[POSITIONS[source]].values[realization][:count])
     normal = None
     if "normal_force" in root and "spring_force" in root:
         normal = np.abs(
             _whole(time, np.atleast_2d(root["normal_force"].values)[realization][:count])
         )
     kept = tuple(one._replace(after=min(one.after, count)) for one in pieces if one.first < count)
-    return StrokeRecord(
-        time, force, position, normal, kept, source, white, correlated, correlation_time
-    )
+    noise_of = (white, correlated, correlation_time)
+    return StrokeRecord(time, force, position, normal, kept, source, *noise_of, noun, remarks)
 
 
 def _whole(time: Array, values: Array) -> Array:

@@ -24,6 +24,8 @@ Array = NDArray[np.float64]
 
 # Name of the quantity by which strokes are guessed.
 FORCE = "sign of the force"
+# Displacements by which strokes are found, in order of preference, and their variables.
+POSITIONS = {"load point": "drive_displacement", "displacement of the slider": "displacement"}
 # Minimum range of the noise over that of the displacement, where it has no noise.
 MIN_RANGE = 1e-5
 # Minimum number of swings above a gap of their sizes, and minimum size of a swing over the median.
@@ -70,7 +72,7 @@ def record_pieces(
     That is the load point, or else the displacement of the slider, or else the sign of the force,
     which is a guess. The pieces are None if the record does not go back and forth.
     """
-    for values, name in ((drive, "load point"), (displacement, "displacement of the slider")):
+    for values, name in zip((drive, displacement), POSITIONS, strict=True):
         if values is not None and np.isfinite(values).any():
             return monotone_pieces(values), name
     return pieces_of_force(time, force), FORCE
@@ -81,8 +83,7 @@ def output_pieces(tree: Tree, realization: int = 0) -> tuple[tuple[Piece, ...] |
     root = tree.to_dataset()
     force = root[next(one for one in FORCES if one in root)].values[realization]
     drive, displacement = (
-        root[one].values[realization] if one in root else None
-        for one in ("drive_displacement", "displacement")
+        root[one].values[realization] if one in root else None for one in POSITIONS.values()
     )
     # Forces are missing after the end of an interrupted run only.
     known = np.isfinite(force)

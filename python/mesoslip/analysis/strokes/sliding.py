@@ -102,6 +102,8 @@ def polarity(force: Array, pieces: Sequence[Piece]) -> float:
     whole = pieces[1:-1] if len(pieces) > 3 else pieces
     means = np.array([np.mean(force[one.samples][_middle(one.size)]) for one in whole])
     forwards = np.array([one.direction for one in whole]) > 0
+    if forwards.all():
+        return -1.0 if means.mean() < 0 else 1.0
     # The difference is free of an offset of the force.
     return -1.0 if means[forwards].mean() < means[~forwards].mean() else 1.0
 

@@ -38,7 +38,7 @@ def _place(found: Strokes) -> tuple[str, Scale]:
     """Label of the position, and its scale."""
     record = found.records[0]
     if record.position is None:
-        return "share of the time of a stroke", Scale("", 1.0)
+        return f"share of the time of a {record.singular}", Scale("", 1.0)
     size = max(one.length for one in found.strokes[0])
     scale = scale_for(size / 2, "m")
     return scale.label("position on the track"), scale
@@ -79,16 +79,18 @@ def draw_cycles(axes: Axes, found: Strokes) -> None:
     scale = scale_for(float(np.max(np.abs(values[known]), initial=0.0)) or 1.0, unit)
     for direction, colour in ((1, RED), (-1, BLUE)):
         shown = known & (columns["direction"] == direction)
+        if not shown.any():
+            continue
         axes.errorbar(
             columns["stroke_number"][shown],
             values[shown] / scale.size,
             errors[shown] / scale.size,
             **(POINTS | {"color": colour, "label": DIRECTIONS[direction]}),
         )
-    axes.set_xlabel("stroke")
+    axes.set_xlabel(found.records[0].singular)
     axes.set_ylabel(scale.label(f"mean {name}"))
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    if known.any():
+    if len(set(columns["direction"][known].tolist())) > 1:
         legend_above(axes)
 
 
@@ -107,7 +109,7 @@ def _draw_map(axes: Axes, found: Strokes, one: FrictionMap, limits: tuple[float,
         vmax=limits[1] / scale.size,
         rasterized=True,
     )
-    axes.set_xlabel("stroke")
+    axes.set_xlabel(found.records[0].singular)
     axes.set_ylabel(label)
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.figure.colorbar(drawn, ax=axes, label=scale.label(name))
@@ -118,20 +120,28 @@ def draw(tree: Tree, options: Options, figure: Canvas | None) -> Canvas:
     found = _found(tree, options)
     is_stacked = is_narrow(figure)
     figure = canvas(figure, (3.4, 9.0) if is_stacked else (7.0, 5.4))
-    panels = list(np.ravel(figure.subplots(*((4, 1) if is_stacked else (2, 2)))))
+    maps = {
+        direction: one
+        for direction in DIRECTIONS
+        if (one := friction_map(found.records[0], found.strokes[0], direction)).number.size
+    }
+    rows, columns = (2 + len(maps), 1) if is_stacked else (2, 2)
+    grid = figure.add_gridspec(rows, columns)
+    places = [grid[0, 0], grid[1, 0] if is_stacked else grid[0, 1]]
+    places += [
+        grid[2 + number, 0] if is_stacked else grid[1, number if len(maps) > 1 else slice(None)]
+        for number in range(len(maps))
+    ]
+    panels = [figure.add_subplot(one) for one in places]
     draw_loops(panels[0], found)
     titles(panels[0], tree)
     draw_cycles(panels[1], found)
-    maps = {
-        direction: friction_map(found.records[0], found.strokes[0], direction)
-        for direction in DIRECTIONS
-    }
     values = np.concatenate([one.friction[np.isfinite(one.friction)] for one in maps.values()])
     low, high = (float(one) for one in np.quantile(values, RANGE))
     for axes, (direction, one) in zip(panels[2:], maps.items(), strict=True):
-        if one.number.size:
-            _draw_map(axes, found, one, (low, high))
-        axes.set_title(DIRECTIONS[direction], loc="left")
+        _draw_map(axes, found, one, (low, high))
+        if len(maps) > 1:
+            axes.set_title(DIRECTIONS[direction], loc="left")
     return figure
 
 

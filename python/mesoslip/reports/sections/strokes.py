@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from mesoslip.analysis.strokes import output_pieces, strokes_of
+from mesoslip.analysis.strokes import has_rotation, output_pieces, strokes_of
 from mesoslip.errors import FileError
 from mesoslip.reports.content import Block, Section, Subject, Table, Text
 from mesoslip.reports.sections.base import named, picture_of
@@ -18,7 +18,7 @@ def strokes(subjects: Sequence[Subject]) -> Section | None:
     blocks: list[Block] = []
     for subject in subjects:
         try:
-            if output_pieces(subject.tree)[0] is None:
+            if output_pieces(subject.tree)[0] is None and not has_rotation(subject.tree):
                 continue
             found = strokes_of(subject.tree, name=subject.name)
         except FileError:

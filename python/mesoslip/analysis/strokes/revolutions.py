@@ -1,0 +1,124 @@
+"""Means over revolutions of a disc, in place of strokes.
+
+The angle is that of a column of revolutions, or the integral of the speed of rotation, or by a
+given period. A row is one revolution, or as many whole ones as have enough samples for a mean.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mesoslip.analysis.strokes.cycles import Cycle
+from mesoslip.analysis.strokes.measure import Measured, Stroke, mean_of
+from mesoslip.analysis.strokes.record import StrokeRecord, record_in
+from mesoslip.analysis.strokes.segments import Piece
+from mesoslip.errors import FileError
+from mesoslip.output.arrays import Tree
+from mesoslip.quantities import with_unit
+
+Array = NDArray[np.float64]
+
+# Minimum number of samples of a row.
+MIN_SAMPLES = 20
+COUNT, SPEED = "revolutions", "rotation_speed"
+
+
+def has_rotation(tree: Tree) -> bool:
+    """Whether the revolutions of a disc are recorded in an output, or its speed."""
+    return any(one in tree.data_vars for one in (COUNT, SPEED))
+
+
+def revolutions_of(
+    tree: Tree, realization: int = 0, period: float | None = None, name: str = "the output"
+) -> tuple[StrokeRecord, list[Stroke], list[Cycle]]:
+    """The record of a disc, and its revolutions as strokes and as cycles.
+
+    The period [s] may be given.
+    """
+    record = record_in(tree, realization, (), "")
+    angle, source = _angle(tree, realization, record.time, period)
+    turned = float(angle[-1] - angle[0])
+    per_revolution = record.time.size / turned if turned > 0 else 0.0
+    each = max(1, math.ceil(MIN_SAMPLES / max(per_revolution, 1e-300)))
+    marks = np.arange(math.ceil(angle[0]), angle[-1], each)
+    at = np.searchsorted(angle, marks).tolist()
+    if len(at) < 2:
+        raise FileError(
+            f"{name}: has {turned:.3g} revolutions by the {source}, with {per_revolution:.3g} "
+            f"samples each; a mean needs whole revolutions with {MIN_SAMPLES} samples"
+        )
+    pieces = tuple(Piece(*ends, 1) for ends in pairwise([0, *at, record.time.size]))
+    speed = turned / float(record.time[-1] - record.time[0])
+    remarks = [
+        f"{turned:.6g} revolutions at {60 * speed:.4g} rpm on average, {per_revolution:.3g} "
+        "samples in each"
+    ]
+    if record.normal is not None:
+        remarks.append(f"normal force {with_unit(float(record.normal.mean()), 'N')} on average")
+    if each > 1:
+        remarks.append(
+            "a revolution has too few samples for a mean of its own: rows are of "
+            f"{each} revolutions"
+        )
+    noun = "revolutions" if each == 1 else f"groups of {each} revolutions"
+    record = record_in(tree, realization, pieces, source, noun, tuple(remarks))
+    rows = [_row(record, one) for one in pieces[1:-1] if one.size > 1]
+    return record, rows, [_as_cycle(one) for one in rows]
+
+
+def _angle(tree: Tree, realization: int, time: Array, period: float | None) -> tuple[Array, str]:
+    """Revolutions at the samples, which do not decrease, and the quantity they are from."""
+    if period is not None:
+        return (time - time[0]) / period, "given period"
+    root = tree.to_dataset()
+    name = COUNT if COUNT in root else SPEED
+    values = root[name].values[realization][: time.size].astype(float)
+    known = np.isfinite(values)
+    values = np.abs(np.interp(time, time[known], values[known]))
+    if name == COUNT:
+        return np.maximum.accumulate(values), "column of revolutions"
+    steps = 0.5 * (values[1:] + values[:-1]) * np.diff(time)
+    return np.concatenate([[0.0], np.cumsum(steps)]), "speed of rotation"
+
+
+def _row(record: StrokeRecord, piece: Piece) -> Stroke:
+    """The friction of a row, which has neither ends nor a reversal."""
+    time, along = record.time[piece.samples], record.sign * record.force[piece.samples]
+    friction = mean_of(record, along)
+    coefficient = Measured()
+    if record.normal is not None:
+        coefficient = friction.over(float(record.normal[piece.samples].mean()))
+    unknown = math.nan
+    return Stroke(
+        piece=piece,
+        direction=piece.direction,
+        start_time=float(time[0]),
+        end_time=float(record.time[min(piece.after, record.time.size - 1)]),
+        length=unknown,
+        velocity=unknown,
+        mean_friction=friction,
+        mean_friction_coefficient=coefficient,
+        max_friction=float(along.max()),
+        max_friction_position=unknown,
+        start_force=unknown,
+        end_force=unknown,
+        stiffness=Measured(),
+        slides=True,
+    )
+
+
+def _as_cycle(one: Stroke) -> Cycle:
+    """A row as a cycle: in one direction, friction and offset cannot be told apart."""
+    return Cycle(
+        one.start_time,
+        one.end_time,
+        one.mean_friction,
+        one.mean_friction_coefficient,
+        Measured(),
+        Measured(),
+        Measured(),
+    )

@@ -1,0 +1,134 @@
+"""The median and the minimum fall at which slips stand out of the noise."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mesoslip.analysis.alternating_extremes import Samples
+from mesoslip.analysis.sampled_slips.levels import Level
+
+Array = NDArray[np.float64]
+
+# Ratio of thresholds for which slips are counted.
+THRESHOLD_RATIO = 1.25
+# Maximum expected share of slips that are noise.
+MAX_FALSE = 0.02
+# Maximum share of mirrored slips that are the trace's own: those that are left at the end of a
+# plateau, where noise would have fewer.
+MAX_OWN = 0.15
+# Significance of the record as a whole, in standard deviations: probability 0.001 by chance.
+SIGNIFICANCE = 3.0
+# Standard deviation of the logarithm of the duration of a rise over that of the fall after it, and
+# coefficient of variation of squared falls above a threshold, in noise of any spectrum.
+NOISE_RATIOS, NOISE_FALLS = 0.85, 0.7
+# Maximum coherence of the phases of events that are no hum, and maximum number of events for it.
+MAX_COHERENCE, MAX_EVENTS = 0.7, 1000
+# Number of mirrored slips at which noise dominates, and smaller minimum falls are not tried.
+MAX_NOISE = 50
+# A plateau: maximum change of the count, and minimum ratio of its thresholds.
+MAX_CHANGE, MIN_PLATEAU = 0.1, 1.5
+
+
+@dataclass(frozen=True)
+class SlipCounts:
+    """How the number of slips depends on the minimum fall, arrays of shape (thresholds,)."""
+
+    threshold: Array = field(default_factory=lambda: np.empty(0))
+    """Minimum falls, in the unit of the force."""
+    count: NDArray[np.int_] = field(default_factory=lambda: np.empty(0, dtype=int))
+    noise_count: NDArray[np.int_] = field(default_factory=lambda: np.empty(0, dtype=int))
+    """Numbers in the trace mirrored in its loading, which are of noise."""
+    plateau: tuple[float, float] | None = None
+    """First and last minimum fall of the range in which the number hardly changes, if any."""
+
+
+class Choice(NamedTuple):
+    """The chosen median and minimum fall, and the slips there."""
+
+    level: Level
+    min_fall: float
+    tops: Samples
+    bottoms: Samples
+    counts: SlipCounts
+
+
+def chosen(every: Sequence[Level]) -> Choice:
+    """The smallest minimum fall at which slips stand out.
+
+    Of the medians that find about as many, the one with the longest plateau of their number.
+    """
+    return max((_at(level) for level in every), key=_persistence)
+
+
+def _persistence(choice: Choice) -> float:
+    """Number of slips times the length of its plateau, in steps of the threshold."""
+    plateau = choice.counts.plateau
+    length = 0.0 if plateau is None else math.log(plateau[1] / plateau[0], THRESHOLD_RATIO)
+    return choice.tops.size * (1 + length)
+
+
+def _at(level: Level) -> Choice:
+    """The slips at the smallest minimum fall at which they stand out; none if they do nowhere."""
+    sizes = level.trace.extremes.fall_sizes
+    deepest = float(sizes[-1]) if sizes.size else 0.0
+    steps = 0
+    if deepest > level.floor > 0:
+        steps = math.ceil(math.log(deepest / level.floor) / math.log(THRESHOLD_RATIO))
+    rows = []
+    for number in reversed(range(steps)):
+        threshold = level.floor * THRESHOLD_RATIO**number
+        steep, mirrored = level.steep_counts(threshold)
+        rows.append((threshold, level.slips(threshold)[0].size, steep, mirrored))
+        if mirrored > max(MAX_NOISE, steep / 2):
+            break
+    thresholds, count, steep, noise = np.array(rows[::-1]).reshape(-1, 4).T
+    count, noise = count.astype(int), noise.astype(int)
+    for at, threshold in enumerate(thresholds.tolist()):
+        # Up to where the number is about the same.
+        same = count[at:] >= (1 - MAX_CHANGE) * count[at]
+        last = at + (int(np.argmin(same)) if not same.all() else len(same)) - 1
+        plateau = None
+        if thresholds[last] >= MIN_PLATEAU * threshold:
+            plateau = threshold, float(thresholds[last])
+        own = 0 if plateau is None else min(noise[last], MAX_OWN * steep[at])
+        few = noise[at] - own <= MAX_FALSE * steep[at]
+        if count[at] and _stands_out(level, threshold, few):
+            counts = SlipCounts(thresholds, count, noise, plateau)
+            return Choice(level, threshold, *level.slips(threshold), counts)
+    nothing = np.empty(0, dtype=int)
+    return Choice(level, max(level.floor, deepest), nothing, nothing, SlipCounts(thresholds, count, noise))
+
+
+def _stands_out(level: Level, threshold: float, is_one_sided: bool) -> bool:
+    """Whether falls above a threshold differ from those of noise.
+
+    In noise rises and falls are alike: the logarithm of the ratio of their durations has mean 0.
+    Falls as fast as rises, in an oscillation, are more equal than those of noise, whose squares
+    above a threshold are about exponentially distributed.
+    """
+    tops, bottoms = level.trace.falls(threshold)
+    chance = SIGNIFICANCE / math.sqrt(tops.size)
+    if is_one_sided:
+        ratios = np.log(level.trace.ratios(tops, bottoms))
+        if float(ratios.mean()) >= NOISE_RATIOS * chance:
+            return True
+    excess = (level.trace.force[tops] - level.trace.force[bottoms]) ** 2 - threshold**2
+    is_regular = float(np.std(excess)) <= NOISE_FALLS * (1 - chance) * float(excess.mean())
+    return is_regular and not _is_clock(level.trace.time[tops])
+
+
+def _is_clock(times: Array) -> bool:
+    """Whether events keep the phase of a clock, as hum does."""
+    if times.size < 3:
+        return False
+    times = times[:MAX_EVENTS] - times[0]
+    near, width = 1 / float(np.median(np.diff(times))), 1 / float(times[-1])
+    frequencies = np.arange(0.8 * near, 1.2 * near, width / 4)
+    phases = [abs(np.exp(2j * math.pi * one * times).mean()) for one in frequencies.tolist()]
+    return max(phases) > MAX_COHERENCE

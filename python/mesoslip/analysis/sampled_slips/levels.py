@@ -1,0 +1,258 @@
+"""A trace after a running median of some width, its falls, and what noise would make of it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mesoslip.analysis.alternating_extremes import Extremes, Samples, extremes_of
+from mesoslip.analysis.noise import Part, TraceNoise, parts_of
+
+Array = NDArray[np.float64]
+
+# Minimum fall over the range of the force, as forces have rounding errors.
+MIN_HEIGHT = 1e-3
+# Minimum fall in digital steps: a median keeps single ones.
+MIN_STEPS = 2.0
+# Widths of the running median, in samples.
+WIDTHS = (1, 3, 5, 9, 17, 33, 65, 129, 257)
+# Maximum rate of loading over the median rate of rises: force that rises faster is a rebound.
+MAX_LOADING = 3.0
+# Minimum depth of a slip over the rebound before it.
+MIN_FALL_RATIO = 2.0
+# Minimum rate of a slip over that of the deepest fall.
+MIN_RATE = 0.02
+# Maximum duration of a rebound over that of the fall after it, half a period of the setup.
+REBOUND = 1.5
+# Part below the maximum, over the smaller one of rise and fall, in which their durations are
+# compared, and maximum of the ratio.
+UPPER, MAX_RATIO = (0.1, 0.5), 100.0
+# Minimum of that ratio: slower falls are responses of smooth sliding.
+MIN_RATIO = 0.5
+# Samples, and widths of the median, over which the slope of the trace is measured.
+SLOPE_SAMPLES, SLOPE_WIDTHS = 8, 2
+
+
+@dataclass
+class Side:
+    """The falls of a trace, or of its mirror image in the line of loading."""
+
+    time: Array
+    force: Array
+    loading_rate: float | None
+    """Rate of the force while the slider is at rest, if known [N/s]."""
+    period: float | None
+    """Period of the setup, if given [s]."""
+    floor: float
+    original: Side | None = None
+    """The trace, of a mirror image."""
+    _falls: dict[float, tuple[Samples, Samples]] = field(default_factory=dict)
+    _ratios: dict[tuple[int, int], float] = field(default_factory=dict)
+    _before: dict[tuple[int, int], int] = field(default_factory=dict)
+
+    @cached_property
+    def extremes(self) -> Extremes:
+        """Alternating extremes for all thresholds."""
+        return extremes_of(self.force)
+
+    def falls(self, threshold: float) -> tuple[Samples, Samples]:
+        """Samples of maximum and minimum of the falls that exceed the rebound before by a threshold.
+
+        A fall from the first sample on has no start.
+        """
+        force, time = self.force, self.time
+        if threshold not in self._falls:
+            self._falls[threshold] = self._exceeding(threshold)
+        return self._falls[threshold]
+
+    def _exceeding(self, threshold: float) -> tuple[Samples, Samples]:
+        force = self.force
+        tops, bottoms = self.extremes.falls(threshold)
+        if tops.size == 0:
+            return tops, bottoms
+        before = np.concatenate([[int(np.argmin(force[: tops[0] + 1]))], bottoms[:-1]])
+        kept = tops > 0
+        for at, (low, top, bottom) in enumerate(
+            zip(before.tolist(), tops.tolist(), bottoms.tolist(), strict=True)
+        ):
+            if kept[at]:
+                self._before[top, bottom] = low
+                rebound = self._rebound(low, top, bottom)
+                kept[at] = force[top] - force[bottom] - MIN_FALL_RATIO * rebound > threshold
+        rates = (force[tops] - force[bottoms]) / (self.time[bottoms] - self.time[tops])
+        kept &= rates >= MIN_RATE * self._deepest_rate
+        return tops[kept], bottoms[kept]
+
+    @cached_property
+    def _deepest_rate(self) -> float:
+        """Rate of the deepest fall [N/s]."""
+        if self.original is not None:
+            return self.original._deepest_rate
+        tops, bottoms = self.extremes.falls(self.floor)
+        tops, bottoms = tops[tops > 0], bottoms[tops > 0]
+        if tops.size == 0:
+            return 0.0
+        drop = self.force[tops] - self.force[bottoms]
+        at = int(np.argmax(drop))
+        return float(drop[at] / (self.time[bottoms[at]] - self.time[tops[at]]))
+
+    def _rebound(self, low: int, top: int, bottom: int) -> float:
+        """Rise just before a fall that is faster than loading, as ringing and impulses are.
+
+        Noise, which increases the difference of a maximum and a minimum, is taken off.
+        """
+        time = self.time
+        duration = REBOUND * (time[bottom] - time[top])
+        if self.period is not None:
+            duration = 0.5 * REBOUND * self.period
+        first = max(low, int(np.searchsorted(time, time[top] - duration)))
+        lowest = first + int(np.argmin(self.force[first : top + 1]))
+        rise = float(self.force[top] - self.force[lowest])
+        if rise <= MAX_LOADING * self._rising * (time[top] - time[lowest]):
+            return 0.0
+        return max(rise - self.floor / 2, 0.0)
+
+    def ratios(self, tops: Samples, bottoms: Samples) -> Array:
+        """Duration of the rise to the maximum of each fall over that of the fall, in the upper part."""
+        pairs = list(zip(tops.tolist(), bottoms.tolist(), strict=True))
+        for one in pairs:
+            if one not in self._ratios:
+                self._ratios[one] = self._ratio(*one)
+        return np.array([self._ratios[one] for one in pairs])
+
+    def _ratio(self, top: int, bottom: int) -> float:
+        force, time, before = self.force, self.time, self._before[top, bottom]
+        rise, fall = force[before : top + 1][::-1], force[top : bottom + 1]
+        height = min(force[top] - force[before], force[top] - force[bottom])
+        durations = []
+        for values, way in ((rise, -1), (fall, 1)):
+            low = int(np.argmax(values <= force[top] - UPPER[1] * height))
+            high = low - 1 - int(np.argmax(values[:low][::-1] >= force[top] - UPPER[0] * height))
+            durations.append(abs(float(time[top + way * low] - time[top + way * high])))
+        return min(MAX_RATIO, durations[0] / durations[1])
+
+    @cached_property
+    def _rising(self) -> float:
+        """Rate of the rises between deep falls, the median over time [N/s]."""
+        if self.original is not None:
+            return self.original._rising
+        if self.loading_rate is not None and self.loading_rate > 0:
+            return self.loading_rate
+        tops, bottoms = self.extremes.falls(self.floor)
+        if tops.size < 2:
+            return math.inf
+        depth = np.sort(self.force[tops] - self.force[bottoms])
+        # Half of the sum of depths is in falls of at least this depth.
+        typical = float(depth[np.searchsorted(np.cumsum(depth), 0.5 * depth.sum())])
+        tops, bottoms = self.extremes.falls(typical / 2)
+        if tops.size < 2:
+            return math.inf
+        duration = self.time[tops[1:]] - self.time[bottoms[:-1]]
+        rate = (self.force[tops[1:]] - self.force[bottoms[:-1]]) / duration
+        order = np.argsort(rate)
+        middle = np.searchsorted(np.cumsum(duration[order]), 0.5 * duration.sum())
+        return float(rate[order][middle])
+
+
+@dataclass(frozen=True)
+class Level:
+    """A trace after a running median, along the drive."""
+
+    parts: tuple[Part, ...]
+    width: float  # of the median [s]
+    floor: float  # minimum fall above the white noise
+    trace: Side
+    mirror: Side
+
+    def slips(self, threshold: float) -> tuple[Samples, Samples]:
+        """Samples of maximum and minimum of the slips above a threshold."""
+        tops, bottoms = self.trace.falls(threshold)
+        kept = self.trace.ratios(tops, bottoms) >= MIN_RATIO
+        return tops[kept], bottoms[kept]
+
+    def steep_counts(self, threshold: float) -> tuple[int, int]:
+        """Numbers of falls much faster than the rises before, in the trace and in its mirror image.
+
+        The latter are of noise, which makes as many in both.
+        """
+        trace, mirror = (
+            np.count_nonzero(one.ratios(*one.falls(threshold)) >= 1 / MIN_RATIO)
+            for one in (self.trace, self.mirror)
+        )
+        return int(trace), int(mirror)
+
+    def on_samples(
+        self, force: Array, tops: Samples, bottoms: Samples
+    ) -> Iterator[tuple[int, int]]:
+        """Samples of the maximum and minimum of each fall in the trace before the median."""
+        last = 0
+        for top, bottom in zip(tops.tolist(), bottoms.tolist(), strict=True):
+            part = next(one for one in self.parts if top < one.after)
+            reach = round(self.width / part.interval) // 2
+            start = min(max(last, top - reach), bottom - 1)
+            top = start + int(np.argmax(force[start : min(top + reach, bottom - 1) + 1]))
+            # The median removes sharp minima: in the force, the first of ringing may be lowest.
+            last = top + 1 + int(np.argmin(force[top + 1 : bottom + reach + 1]))
+            yield top, last
+
+    def half_samples(self, at: int, period: float) -> int:
+        """Samples in half a period, at a sample."""
+        part = next(one for one in self.parts if at < one.after)
+        return max(1, round(period / 2 / part.interval))
+
+
+def levels(
+    time: Array,
+    force: Array,
+    noise: float | TraceNoise,
+    *,
+    period: float | None = None,
+    loading_rate: float | None = None,
+) -> Iterator[Level]:
+    """The trace after running medians, from narrow to wide, until noise is negligible."""
+    parts = parts_of(time)
+    interval = max(parts, key=len).interval
+    white, step = noise, 0.0
+    if isinstance(noise, TraceNoise):
+        white, step = noise.deviation, noise.digital_step
+    for width in WIDTHS:
+        if width > 1 and (
+            width > len(force) // 8 or (period is not None and width * interval > period / 4)
+        ):
+            return
+        filtered = _running_median(force, parts, width * interval)
+        height = max(MIN_HEIGHT * float(np.ptp(filtered)), MIN_STEPS * step)
+        # The variance of a median is pi/2 times that of a mean.
+        deviation = white * (1.0 if width == 1 else math.sqrt(math.pi / 2 / width))
+        noise_range = _noise_range(len(force) / width) * deviation
+        floor = max(noise_range, height)
+        reach = min(max(SLOPE_SAMPLES, SLOPE_WIDTHS * width), len(force) - 1)
+        slope = float(np.median((filtered[reach:] - filtered[:-reach]) / (time[reach:] - time[:-reach])))
+        trace = Side(time, filtered, loading_rate, period, floor)
+        mirrored = 2 * slope * (time - time[0]) - filtered
+        mirror = Side(time, mirrored, loading_rate, period, floor, trace)
+        yield Level(parts, width * interval, floor, trace, mirror)
+        if noise_range <= height and not isinstance(noise, TraceNoise):
+            return
+
+
+def _noise_range(count: float) -> float:
+    """Range that a number of values of normal noise hardly exceeds, in standard deviations."""
+    return 2 * math.sqrt(2 * math.log(max(count, 2.0))) + 1
+
+
+def _running_median(force: Array, parts: Sequence[Part], duration: float) -> Array:
+    """Medians over a duration [s], within each part."""
+    from scipy.ndimage import median_filter
+
+    filtered = force.copy()
+    for part in parts:
+        width = 2 * round((duration / part.interval - 1) / 2) + 1
+        if width > 1:
+            filtered[part.samples] = median_filter(force[part.samples], width, mode="nearest")
+    return filtered

@@ -13,9 +13,9 @@ from conftest import ROOT
 from mesoslip.cycles import branch
 from mesoslip.cycles.branch import adapted
 from mesoslip.cycles.coordinates import PINNED, SLIDER, Coordinates
-from mesoslip.cycles.cycle import master_equation
+from mesoslip.cycles.cycle import _cycle_of, master_equation
 from mesoslip.cycles.section import Motion
-from mesoslip.cycles.settling import _Settling
+from mesoslip.cycles.settling import Settled, _Settling
 from mesoslip.simulation.archive import Archive
 from mesoslip.theory.contacts import contact_theory
 from mesoslip.theory.contacts.plain_sliding import SteadySliding
@@ -148,6 +148,16 @@ def test_multiplier_is_the_decay_of_a_perturbation(regular):
     factor = (sizes[5] / sizes[1]) ** 0.25
     assert regular.is_stable
     assert factor == pytest.approx(abs(regular.multipliers[0]), rel=0.3)
+
+
+def test_the_spread_of_an_irregular_motion_has_its_periods():
+    """Of passages between the same extremes, a fifth of which take longer."""
+    durations = np.where(np.arange(80) % 5, 1.0, 1.5)
+    rows = np.stack([durations, np.full(80, 2.0), np.full(80, 1.0)], axis=1)
+    words = np.empty(0, dtype=np.int64)
+    settled = Settled("irregular", 1, [], None, words, 80.0, 80, 0, math.nan, [], rows)
+    found = _cycle_of(configuration(), settled, (), None, 0, math.nan)
+    assert found.spread == pytest.approx(np.std(durations[20:]) / np.mean(durations[20:]))
 
 
 def test_smooth_sliding_and_irregular_motion_are_told_apart():

@@ -120,3 +120,36 @@ def test_steps_of_a_hold_are_not_as_short_as_the_delay(delay):
             run.advance(500)
         assert run.finished
         assert run.advances < 1000
+
+
+def test_the_error_at_resolution_one_is_seen():
+    """Of a creeping slider, by a run with steps a fourth as long: the coarse run by which a run
+    estimates its error has longer steps than that of resolution 1."""
+    runs = [
+        Realization(
+            configuration(
+                "rigid, thermal",
+                run={"engine": "me", "duration": 0.1, "resolution": resolution},
+                drive={"velocity": 1.538e-6},
+                contacts__delay=0.0,
+                contacts__back_force_ratio=0.1,
+                contacts__threshold={"law": "gaussian", "relative_width": 0.212},
+                contacts__thermal={"rate": 342.0, "force_ratio": 0.0778},
+                contacts__ageing={
+                    "law": "relax",
+                    "time": 0.05,
+                    "young_force_ratio": 0.7,
+                    "young_relative_width": 0.2,
+                },
+                output={"interval": 1e-3},
+            )
+        )
+        for resolution in (1.0, 0.25)
+    ]
+    for one in runs:
+        while not one.finished:
+            one.advance()
+    starts = [one.slips[:, 1].min(initial=math.inf) for one in runs]
+    before = runs[0].trace[:, 0] < min(starts)
+    error = np.max(np.abs(runs[0].trace[before, 5] - runs[1].trace[before, 5]))
+    assert error / 5 < runs[0].force_error < 5 * error

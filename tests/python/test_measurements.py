@@ -234,6 +234,7 @@ def test_damaged_files_give_no_wrong_numbers(tmp_path, number):
         # The unit decides, and names of groups stand before names.
         ("Friction [uN]", "force", "uN"),
         ("Normal [uN]", "normal_force", "uN"),
+        ("Shear [N]", "force", "N"),
         ("Normal stress (kN)", "normal_force", "kN"),
         ("COF [%]", "friction", "%"),
         ("DAQ.Fx (N)", "force", "N"),

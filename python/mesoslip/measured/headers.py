@@ -32,7 +32,7 @@ NAMES = {
     "|lateral force|tangential force|horizontal force|pulling force|traction force|drive force"
     "|driving force|kraft|reibkraft|ft|f t|fx|f x|f|fs|force x|force t|force tangential"
     "|horizontal load|force de frottement|force tangentielle",
-    "shear_stress": "shear stress|shearstress|tau|τ|shear strs|stress shear",
+    "shear_stress": "shear|shear stress|shearstress|tau|τ|shear strs|stress shear",
     "friction": "friction|friction coefficient|coefficient of friction|friction coeff"
     "|friction coef|coef of friction|coeff of friction|cof|mu|f mg|f over mg|f over n|f fn"
     "|f over fn|f w|ft fn|f t f n|apparent friction|tau sigma|tau over sigma|tau sigma n|tau sn"
@@ -70,14 +70,6 @@ LIKE = {
 }
 MEANINGS = {name: quantity for quantity, names in NAMES.items() for name in names.split("|")}
 
-# Names whose quantity is that of their unit.
-NAMED_BY_UNIT = {
-    "friction": ("force", "shear_stress"),
-    "shear": ("force", "shear_stress"),
-    "normal": ("normal_force", "normal_stress"),
-    "load": ("normal_force", "normal_stress"),
-}
-
 BRACKETS = re.compile(r"\[([^\]]*)\]|\(([^)]*)\)|\{([^}]*)\}|<([^>]*)>")
 
 
@@ -103,12 +95,6 @@ def meaning_of(name: str) -> str | None:
     """The quantity of a name; None if it is not known."""
     bare = name_of(name)
     return MEANINGS.get(bare) or MEANINGS.get(re.sub(r" ?\d$", "", bare) if bare[:-1] else "")
-
-
-def _named_by_unit(name: str, unit: str) -> str | None:
-    """The quantity of a name of which the unit says whether it is a force or a stress."""
-    known = NAMED_BY_UNIT.get(name_of(name), ())
-    return next((one for one in known if _fits(unit, one)), None)
 
 
 def read_header(header: str, unit: str = "") -> Heading:
@@ -150,10 +136,7 @@ def _read(header: str, unit: str) -> Heading:
     text = header.strip(" \"'")
     unit = unit.strip("[](){}<> ")
     if unit:
-        quantity = (
-            _named_by_unit(text, unit) or meaning_of(_without_brackets(text)) or meaning_of(text)
-        )
-        return Heading(quantity, unit)
+        return Heading(meaning_of(_without_brackets(text)) or meaning_of(text), unit)
     # Either a force in newtons, or a normal force without a unit.
     if re.fullmatch(r"(?i)f_?n", text):
         return Heading(None, None)
@@ -168,7 +151,7 @@ def _read(header: str, unit: str) -> Heading:
             "friction", None, f"{text!r} taken as force over normal force, not as newtons"
         )
     for name, named in _divided(text):
-        quantity = _named_by_unit(name, named) or meaning_of(name)
+        quantity = meaning_of(name)
         if quantity is not None and (named == "" or _fits(named, quantity)):
             return Heading(quantity, named or None)
     for name, named in _divided(text):

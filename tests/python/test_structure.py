@@ -32,10 +32,13 @@ MAY_USE: dict[str, set[str]] = {
     "normal_load": {"numerics"},
     "interface_law": {"numerics"},
     "hazard": {"numerics", "interface_law"},
-    "schedule": {"numerics", "interface_law", "hazard"},
+    "track_strength": {"numerics"},
+    "schedule": {"numerics", "interface_law", "hazard", "track_strength"},
     "step_filter": {"numerics"},
     "drive": {"numerics", "extremes"},
-    "contacts": {"numerics", "interface_law", "hazard", "schedule", "normal_load"},
+    "contacts": {
+        *("numerics", "interface_law", "hazard", "track_strength", "schedule", "normal_load"),
+    },
     "sliders": {"numerics", "interface_law", "hazard", "schedule", "step_filter", "drive"},
     "recording": {
         *("numerics", "interface_law", "schedule", "step_filter", "drive"),
@@ -46,7 +49,9 @@ MAY_USE: dict[str, set[str]] = {
         *("numerics", "interface_law", "schedule", "step_filter", "drive"),
         *("contacts", "sliders", "recording"),
     },
-    "boundary": {"numerics", "contacts", "sliders", "recording", "theory", "loop"},
+    "boundary": {
+        *("numerics", "track_strength", "contacts", "sliders", "recording", "theory", "loop"),
+    },
 }
 # The lists of kinds stand beside their folders: what is in a folder does not know them.
 KINDS = {"mesoslip_contacts", "mesoslip_sliders"}
@@ -281,7 +286,7 @@ def test_kinds_of_contacts_are_the_same_on_both_sides():
         for path in room.glob("*.py")
         for name in re.findall(classes, path.read_text(), re.MULTILINE)
     }
-    answered = contacts.COMMON_KEYS.union(*(kind.features for kind in contacts.KINDS))
+    answered = contacts.COMMON_KEYS.union(*(one.features | one.options for one in contacts.KINDS))
     assert {f"contacts.{key}" for key in Contacts.model_fields} <= answered
 
 

@@ -168,17 +168,17 @@ def _with_noise(
     size, delay = len(force), 0.0
     share = float(rng.choice([0.0, 0.0, 0.4, 0.7]))
     memory = math.exp(-1 / math.exp(rng.uniform(0, 3)))
-    correlated = lfilter(
-        [math.sqrt(1 - memory**2)], [1, -memory], rng.standard_normal(size + 200)
-    )[200:]
-    added = noise * (
-        math.sqrt(1 - share**2) * rng.standard_normal(size) + share * correlated
-    )
+    correlated = lfilter([math.sqrt(1 - memory**2)], [1, -memory], rng.standard_normal(size + 200))[
+        200:
+    ]
+    added = noise * (math.sqrt(1 - share**2) * rng.standard_normal(size) + share * correlated)
     extra = np.zeros(size)
     if rng.random() < 0.3:
         frequency = rng.uniform(0.01, 0.2)
-        extra += noise * rng.uniform(0.3, 3) * np.sin(
-            2 * math.pi * frequency * np.arange(size) + rng.uniform(0, 6)
+        extra += (
+            noise
+            * rng.uniform(0.3, 3)
+            * np.sin(2 * math.pi * frequency * np.arange(size) + rng.uniform(0, 6))
         )
     if rng.random() < 0.3:
         hit = rng.random(size) < 0.01 * rng.random()
@@ -325,9 +325,7 @@ def _jerky(rng: np.random.Generator, number: int) -> Motion:
         rise = since * (1 - 0.5 * creep * (since / pause) ** 3)
         # An echo of the fall before.
         last = drops[len(starts) - 1] if starts else 0.0
-        echo = 0.5 * last * ringing * np.exp(-since / duration) * np.sin(
-            math.pi * since / duration
-        )
+        echo = 0.5 * last * ringing * np.exp(-since / duration) * np.sin(math.pi * since / duration)
         force.append(level + rise + echo)
         time.append(at + since)
         at, level = at + pause, level + float(rise[-1] + echo[-1])
@@ -446,8 +444,10 @@ def table(judgements: Iterable[Judgement]) -> str:
     """Slips, recall, found slips and precision, by kind and by drop over noise."""
     rows = []
     every = list(judgements)
-    groups = {kind: [one for one in every if one.kind == kind] for kind in
-              dict.fromkeys(one.kind for one in every)}
+    groups = {
+        kind: [one for one in every if one.kind == kind]
+        for kind in dict.fromkeys(one.kind for one in every)
+    }
     for kind, some in groups.items():
         slips = sum(len(one.drop) for one in some)
         found = sum(int(one.is_found.sum()) for one in some)
@@ -467,7 +467,8 @@ def table(judgements: Iterable[Judgement]) -> str:
         rows.append(
             f"{low:>7} to {high:>4}: recall {is_found[inside].mean():6.1%} of {inside.sum():5}, "
             f"precision {is_right[found].mean():6.1%} of {found.sum():5}"
-            if inside.any() and found.any() else f"{low:>7} to {high:>4}: none"
+            if inside.any() and found.any()
+            else f"{low:>7} to {high:>4}: none"
         )
     return "\n".join(rows)
 

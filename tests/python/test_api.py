@@ -7,6 +7,7 @@ import subprocess
 import sys
 
 import mesoslip
+import numpy as np
 import pytest
 import xarray as xr
 from conftest import klein_tables
@@ -92,13 +93,27 @@ ARGUMENTS = {
     "threshold": LAW.density,
     "twins": lambda wrong: mesoslip.lyapunov(CONFIG, twins=wrong),
     "cluster": mesoslip.Dask,
+    "update": lambda wrong: CONFIG.model_copy(update=wrong),
+    "deep": lambda wrong: CONFIG.model_copy(deep=wrong),
+    "rate": lambda wrong: mesoslip.SteadySliding(CONFIG).response_at(wrong),
+    "fit": lambda wrong: mesoslip.response("none.nc", fit=wrong),
+    "find_multipliers": lambda wrong: mesoslip.cycle(CONFIG, find_multipliers=wrong),
+    "estimates_errors": lambda wrong: mesoslip.Realization(CONFIG, estimates_errors=wrong),
+    "letters": lambda wrong: mesoslip.plot("none.nc", letters=wrong),
+    "view": lambda wrong: mesoslip.plot("none.nc", view=wrong),
+    "table": lambda wrong: mesoslip.Realization(CONFIG).table(wrong),
+}
+# Those for which a value that is wrong elsewhere is right.
+RIGHT = {
+    *(("tables", dict), ("changes", dict), ("update", dict), ("rate", complex)),
+    *((name, np.ndarray) for name in ("overrides", "probability", "threshold", "rate")),
 }
 
 
 @pytest.mark.parametrize("name", ARGUMENTS)
-@pytest.mark.parametrize("wrong", [10**400, 1j, {5: object}, object()], ids=type)
+@pytest.mark.parametrize("wrong", [10**400, 1j, {5: object}, object(), np.array([])], ids=type)
 def test_wrong_arguments_are_named(name, wrong):
-    if name in {"tables", "changes"} and isinstance(wrong, dict):
+    if (name, type(wrong)) in RIGHT:
         return
     with pytest.raises(MesoslipError, match=name):
         ARGUMENTS[name](wrong)

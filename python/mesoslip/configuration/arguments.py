@@ -117,17 +117,29 @@ def numbers(value: Any) -> tuple[float, ...]:
         raise ValueError("must be several finite numbers") from None
 
 
-def array(value: Any) -> Any:
+def array(value: Any, kinds: str = "fiu") -> Any:
     """Real numbers of any shape."""
     import numpy as np
 
     try:
         found = np.asarray(value)
-        if found.dtype.kind not in "fiu":
+        if found.dtype.kind not in kinds:
             raise TypeError
-        return found.astype(float)
+        return found.astype(complex if "c" in kinds else float)
     except (OverflowError, TypeError, ValueError):
         raise ValueError("must be a number, or an array of numbers") from None
+
+
+complex_array = functools.partial(array, kinds="fiuc")
+
+
+def flag(value: Any) -> bool:
+    """True or False, also as 1 or 0."""
+    try:
+        # NumPy's are no integers.
+        return {0: False, 1: True}[operator.index(getattr(value, "tolist", lambda: value)())]
+    except (KeyError, TypeError):
+        raise ValueError("must be True or False") from None
 
 
 text = instance(str, "a text")

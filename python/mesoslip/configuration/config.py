@@ -428,6 +428,7 @@ class Config(Table):
         """The title, unless it is that of the base."""
         return self.title if self.base is None or self.base.title != self.title else None
 
+    @arguments.checked(update=arguments.table, deep=arguments.flag)
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
         """A copy, with other tables if given, which are checked."""
         with _problems_of("configuration"):

@@ -79,6 +79,7 @@ class End(NamedTuple):
     values=arguments.numbers,
     tolerance=arguments.number(0, 1, is_open=True),
     max_cycles=arguments.whole(1),
+    find_multipliers=arguments.flag,
     progress=arguments.function,
 )
 def branches(

@@ -44,6 +44,7 @@ STARTS = ("relaxed", "steady", "uniform")
 @arguments.checked(
     tolerance=arguments.number(0, 1, is_open=True),
     max_cycles=arguments.whole(1),
+    find_multipliers=arguments.flag,
     progress=arguments.function,
 )
 def cycle(

@@ -14,6 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.ticker import MaxNLocator
 
+from mesoslip.configuration import arguments
 from mesoslip.configuration.reading import PathLike, as_path
 from mesoslip.configuration.units import to_si
 from mesoslip.errors import ConfigError, FileError, Problem
@@ -30,6 +31,7 @@ from mesoslip.plots.views.base import Options
 FEW_TICKS = 4
 
 
+@arguments.checked(view=arguments.text, letters=arguments.flag)
 def plot(
     output: OutputLike | Sequence[OutputLike],
     file: PathLike | None = None,

@@ -144,6 +144,7 @@ class Realization(Recorded):
     @arguments.checked(
         config=arguments.instance(Config, "a Config"),
         number=arguments.whole(0),
+        estimates_errors=arguments.flag,
         coarsening=arguments.number(0, is_open=True),
         after=arguments.instance(End, "the end of another realization"),
     )

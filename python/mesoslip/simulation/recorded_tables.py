@@ -13,7 +13,7 @@ from typing import IO
 import numpy as np
 from numpy.typing import NDArray
 
-from mesoslip.errors import RunError
+from mesoslip.errors import RunError, shown
 from mesoslip.execution.regular_files import open_regular
 from mesoslip.simulation.kernel import name_list
 
@@ -209,6 +209,8 @@ class Recorded:
 
     def rows(self, table: str) -> Rows | FirstRows | SnapshotRows:
         """Rows of one of `TABLES`; samples around a slip come with the slip's row."""
+        if not isinstance(table, str) or table not in COLUMNS:
+            raise RunError(f"there is no table {shown(table)}, but there are {', '.join(COLUMNS)}")
         rows = self._tables.get(table) or Rows(len(COLUMNS[table]))
         if table == "slip_trace":
             return FirstRows(rows, self._slip_samples(rows))
@@ -235,10 +237,12 @@ class Recorded:
         RunError
             If there is no such table, or its columns have no names.
         """
-        columns = COLUMNS.get(name)
+        columns = COLUMNS.get(name) if isinstance(name, str) else None
         if not columns:
             known = ", ".join(repr(other) for other, names in COLUMNS.items() if names)
-            raise RunError(f"there is no table {name!r} with named columns, but there are {known}")
+            raise RunError(
+                f"there is no table {shown(name)} with named columns, but there are {known}"
+            )
         return structured(self.rows(name).read(), columns)
 
     @property

@@ -169,6 +169,7 @@ class LinearStability(abc.ABC):
         """
         return self.response_at(1j * np.asarray(frequency, dtype=float))
 
+    @arguments.checked(rate=arguments.complex_array)
     def response_at(self, rate: ArrayLike) -> Complex:
         """Λ(λ) for complex rates λ other than 0 [N/m]."""
         values = np.asarray(rate, dtype=np.complex128)

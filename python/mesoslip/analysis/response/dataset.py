@@ -45,7 +45,11 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-@arguments.checked(normal_force=arguments.number(0, is_open=True))
+@arguments.checked(
+    normal_force=arguments.number(0, is_open=True),
+    fit=arguments.flag,
+    free_stiffness=arguments.flag,
+)
 def response(
     output: OutputLike | Sequence[OutputLike],
     *,

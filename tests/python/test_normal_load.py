@@ -388,3 +388,14 @@ def test_a_vibrating_load_has_no_steps():
     load = {"normal_force": 1.0, "cycle": {"amplitude": 0.4, "frequency": 1e-3}}
     tree = mesoslip.run(sliding(load, 3000.0, count=500))
     assert mesoslip.response(tree, fit=False)["load_steps"].sizes["load_step"] == 0
+
+
+def test_reports_and_pictures_have_the_load():
+    from mesoslip.plots.views.run import caption
+    from mesoslip.reports.method_paragraphs import feature_sentence
+
+    config = configuration("rigid", **VIBRATING)
+    sentence = feature_sentence(config.contact_features["load"], "load", config)
+    assert "between 400 mN and 1.6 N at 100 1/s" in sentence
+    assert "normal force" in caption(mesoslip.run(config))
+    assert "normal force" not in caption(mesoslip.run(configuration("rigid")))

@@ -35,6 +35,7 @@ GROUPS = {
     "contacts.ageing": "Ageing",
     "contacts.thermal": "Temperature",
     "contacts.track": "Track",
+    "load": "Normal load",
     "interaction": "Interaction",
 }
 # Threshold laws that need no more than a width.
@@ -270,6 +271,23 @@ CONTROLS = (
     Control("contacts.thermal.force_ratio", "force f_T/f_s", 1.5, (1e-3, 1), ACTIVATION_RATIO),
     Control("contacts.thermal.temperature", "temperature T", 1, usual=ROOM_TEMPERATURE),
     Control("contacts.thermal.activation_length", "activation length x_a", 1.5, usual=1e-10),
+    Control(
+        "load.cycle",
+        "normal load",
+        choices=(NONE, "amplitude"),
+        choice_labels={NONE: "constant", "amplitude": "vibrates"},
+        required={
+            "amplitude": {
+                "load.normal_force": "1 N",
+                "load.cycle.amplitude": "0.4 N",
+                "load.cycle.frequency": "10 1/s",
+            }
+        },
+        is_switch=True,
+    ),
+    Control("load.normal_force", "normal force L_0", 1.5),
+    Control("load.cycle.amplitude", "amplitude of the load", 1.5),
+    Control("load.cycle.frequency", "frequency of the load", 2),
     Control(
         "contacts.track",
         "strength along the track",

@@ -7,7 +7,7 @@ import numpy as np
 from mesoslip.configuration.units import from_cf_units
 from mesoslip.output.access import is_measured
 from mesoslip.output.arrays import Tree
-from mesoslip.output.variables import TRACE
+from mesoslip.output.variables import LOADED, TRACE
 
 NAMES = {
     "spring_force": "spring force",
@@ -16,10 +16,11 @@ NAMES = {
     "contact_force": "contact force",
     "velocity": "velocity",
     "detached_contacts": "detached contacts",
+    "normal_force": "normal force",
 }
 # Units of the trace as configurations write them.
-UNITS = {name: from_cf_units(one.units) for name, one in TRACE.items()}
-UNITS |= {"time": "s", "friction_coefficient": "1"}
+UNITS = {name: from_cf_units(one.units) for name, one in (TRACE | LOADED).items()}
+UNITS["time"] = "s"
 
 
 def is_known(tree: Tree, name: str) -> bool:

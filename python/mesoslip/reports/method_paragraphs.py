@@ -14,6 +14,7 @@ from mesoslip.configuration.config import Config
 from mesoslip.configuration.contacts.tables import Ageing, Interaction, Thermal, Track
 from mesoslip.configuration.drive import Drive
 from mesoslip.configuration.keys import key_kind
+from mesoslip.configuration.load import Load
 from mesoslip.configuration.sliders.base import SliderTable
 from mesoslip.configuration.sliders.force import ForceSlider
 from mesoslip.configuration.sliders.layered import LayeredSlider
@@ -342,6 +343,23 @@ def _track(track: Track, key: str, config: Config) -> str:  # noqa: ARG001
 @feature_sentence.register
 def _renewal(renewal: str, key: str, config: Config) -> str:  # noqa: ARG001
     return "A contact keeps its threshold in all its lives."
+
+
+@feature_sentence.register
+def _load(load: Load, key: str, config: Config) -> str:  # noqa: ARG001
+    reference = quantity(load.normal_force, "N")
+    if not load.varies:
+        return (
+            f"They are {load.max_force / load.normal_force:g} times as many, under the normal "
+            f"force {quantity(load.max_force, 'N')}, N under {reference}."
+        )
+    within = f"between {quantity(load.min_force, 'N')} and {quantity(load.max_force, 'N')}"
+    if load.cycle is not None:
+        within += f" at {quantity(load.cycle.frequency, '1/s')}"
+    return (
+        f"Their number is that at the normal force {reference}, and proportional to it; it varies "
+        f"{within}. Contacts touch without a force, and the last ones separate first."
+    )
 
 
 @feature_sentence.register

@@ -116,7 +116,9 @@ def _draw_variable(
 
 def _known_below(trees: Sequence[Tree]) -> list[str]:
     """The variables below the force that an output has."""
-    return [name for name in BELOW if any(is_known(tree, name) for tree in trees)]
+    below = [name for name in BELOW if any(is_known(tree, name) for tree in trees)]
+    loaded = any(not is_measured(tree) and config_of(tree).pressing.varies for tree in trees)
+    return [*below, "normal_force"] if loaded else below
 
 
 def caption(tree: Tree) -> str:

@@ -54,9 +54,11 @@ module mesoslip_track_strength
       logical :: is_used = .false.
       !> Displacement of the origin of displacements [m]
       real(wp) :: origin = 0.0_wp
-      !> Spread w, correlation length l [m], and minimum factor of thresholds
-      real(wp), private :: spread = 0.0_wp, length = 1.0_wp, floor = 0.0_wp
+      !> Spread w, correlation length l [m] and one over it, and minimum factor of thresholds
+      real(wp), private :: spread = 0.0_wp, length = 1.0_wp, per_length = 1.0_wp, floor = 0.0_wp
       integer, private :: correlation = correlation_gaussian
+      !> Cells of a block
+      integer, private :: cells = max_cells
       !> Key of the random numbers
       integer(i8), private :: seed = 0_i8, realization = 0_i8
       !> Number of the present block, and g at the ends of its cells
@@ -101,7 +103,9 @@ contains
             & // "be positive, and its spread not negative")
          return
       end if
-      cell = 1.0_wp / block_cells(self%correlation)
+      self%per_length = 1.0_wp / self%length
+      self%cells = block_cells(self%correlation)
+      cell = 1.0_wp / self%cells
       if (self%correlation == correlation_gaussian) then
          self%missing = 1.0_wp - exp(-0.5_wp * cell**2)
       else
@@ -131,7 +135,7 @@ contains
       integer :: cell
 
       ! The start is in the middle of a block.
-      place = (self%origin + displacement) / self%length + 0.5_wp
+      place = (self%origin + displacement) * self%per_length + 0.5_wp
       place = max(-max_block, min(max_block, place))
       block = floor(place, i8)
       if (block /= self%block) then
@@ -142,13 +146,11 @@ contains
             call self%fill_exponential()
          end if
       end if
-      associate (cells => block_cells(self%correlation))
-         place = (place - real(block, wp)) * cells
-         cell = min(int(place), cells - 1)
-         part = place - cell
-         strength = self%value(cell) + part * (self%value(cell + 1) - self%value(cell))
-         strength = strength * (1.0_wp + part * (1.0_wp - part) * self%missing)
-      end associate
+      place = (place - real(block, wp)) * self%cells
+      cell = min(int(place), self%cells - 1)
+      part = place - cell
+      strength = self%value(cell) + part * (self%value(cell + 1) - self%value(cell))
+      strength = strength * (1.0_wp + part * (1.0_wp - part) * self%missing)
    end function relative_strength
 
    !> Usual maximum of the factor: it is higher in some hundredth of the track.

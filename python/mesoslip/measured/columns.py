@@ -327,6 +327,9 @@ def _two(
                 usable.append(index)
             else:
                 found.unused[index] = "has no numbers"
+    if quantity == "time" and len(usable) == 2 and _same_clock(*table.values[usable]):
+        usable.sort(key=lambda one: np.unique(table.values[one]).size)
+        found.unused[usable.pop(0)] = "another column has the same time"
     if len(usable) == 1:
         _use(table, quantity, usable[0], headings[usable[0]], found)
         return
@@ -338,6 +341,15 @@ def _two(
         )
     for index in usable:
         found.unused[index] = f"two columns of {quantity.replace('_', ' ')}"
+
+
+def _same_clock(one: Array, other: Array) -> bool:
+    """Whether two columns of times differ by a constant, up to the steps in which they are read."""
+    known = np.isfinite(one) & np.isfinite(other)
+    if np.count_nonzero(known) < 2:
+        return False
+    step = max(float(np.median(np.abs(np.diff(row[known])))) for row in (one, other))
+    return float(np.ptp(one[known] - other[known])) <= 2 * step
 
 
 def _use(table: Table, quantity: str, index: int, heading: Heading, found: Assignment) -> None:

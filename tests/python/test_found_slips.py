@@ -8,8 +8,10 @@ import mesoslip
 import numpy as np
 import pytest
 from conftest import klein_tables
+from made_records import judge, made_record
 from mesoslip.analysis.alternating_extremes import extremes_of
 from mesoslip.analysis.rate_and_state import Loading
+from mesoslip.analysis.regime import SMOOTH, STICK_SLIP
 from mesoslip.analysis.sampled_slips import find_slips
 from mesoslip.analysis.stick_phases import stick_phases
 from oracles import Friction, spring_slider
@@ -234,3 +236,52 @@ def test_creep_begins_after_the_rebound(delay, damping_ratio):
         # Pinned contacts stretch by K/(K + Nk) of the drive; only some break before a slip.
         assert np.all(share > 0.8 * 97 / 2097)
         assert np.median(share) < 0.15
+
+
+@pytest.mark.parametrize("number", [7, 46, 66, 166, 206])
+def test_slips_of_made_records(number):
+    """Falls of all sizes, noise of every kind; tests/studies/made_records.py has 300 records."""
+    found = judge(made_record(number))
+    visible = found.drop > 12
+    assert found.is_found[visible].mean() > 0.8
+    assert found.is_right.mean() > 0.9
+
+
+@pytest.mark.parametrize("number", [8, 9, 19, 48])
+def test_made_records_without_slips(number):
+    assert len(judge(made_record(number)).is_right) == 0
+
+
+@pytest.mark.parametrize("shape", ["oscillation", "sawtooth", "noise"])
+def test_a_given_minimum_fall_is_obeyed(shape):
+    """No other rule vetoes it: falls above it count, with and without asymmetry and noise."""
+    rng = np.random.default_rng(1)
+    time = 1e-3 * np.arange(20_000)
+    phase = time % 0.1
+    force = {
+        "oscillation": np.sin(2 * np.pi * time / 0.1),
+        "sawtooth": np.interp(phase, [0, 0.09, 0.1], [-1, 1, -1]),
+        "noise": lfilter([0.2], [1, -0.98], rng.standard_normal(time.size)),
+    }[shape]
+    found = find_slips(time, force + 0.01 * rng.standard_normal(time.size), min_fall=0.8)
+    if shape == "noise":
+        assert len(found) > 10
+    else:
+        assert abs(len(found) - 200) <= 1
+    assert found.min_fall == 0.8
+
+
+def test_small_slips_are_stick_slip_and_smooth_sliding_has_none(tmp_path):
+    """One definition for slips and regime: a drop of .0053 of .6 above the noise, and noise."""
+    time = 1e-2 * np.arange(8_000)
+    saw = np.interp(time % 5.0, [0, 4.8, 5.0], [0, 0.0053, 0])
+    noise = 2e-4 * np.random.default_rng(1).standard_normal(time.size)
+    found = {}
+    for name, force in {"slips": 0.6 + saw + noise, "smooth": 0.6 + noise}.items():
+        path = tmp_path / f"{name}.csv"
+        np.savetxt(path, np.stack([time, force], axis=1), "%.6f", ",", header="time [s],mu")
+        tree = mesoslip.read_trace(path, velocity=1e-6)
+        found[name] = mesoslip.regime(tree)["regime"].item(), tree["slips"].sizes["slip"]
+        counts = tree["slip_counts"]
+        assert counts["mirrored_count"].sizes == counts["slip_count"].sizes
+    assert found == {"slips": (STICK_SLIP, 16), "smooth": (SMOOTH, 0)}

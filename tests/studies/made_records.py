@@ -13,6 +13,7 @@ prints recall and precision by kind, and by force drop over noise, of both halve
 
 from __future__ import annotations
 
+import itertools
 import math
 import sys
 from collections.abc import Callable, Iterable
@@ -26,8 +27,8 @@ import numpy as np
 from mesoslip.analysis.alternating_extremes import extremes_of
 from mesoslip.analysis.sampled_slips import find_slips
 from numpy.typing import NDArray
-from scipy.ndimage import uniform_filter1d
 from scipy.integrate import solve_ivp
+from scipy.ndimage import uniform_filter1d
 from scipy.signal import butter, lfilter, sosfilt
 
 Array = NDArray[np.float64]
@@ -221,7 +222,7 @@ def _run_of(which: int, seed: int) -> Motion:
     return Motion(tree["time"].values, tree["spring_force"].values[0], *columns)
 
 
-def _run(rng: np.random.Generator, number: int) -> Motion:
+def _run(_: np.random.Generator, number: int) -> Motion:
     return _run_of(number % len(RUNS), number // len(RUNS) % 2)
 
 
@@ -273,11 +274,11 @@ def _slider(
     return _falls(found.t, force)
 
 
-def _rate_and_state(rng: np.random.Generator, number: int) -> Motion:
+def _rate_and_state(rng: np.random.Generator, _: int) -> Motion:
     return _slider(rng)
 
 
-def _inertial(rng: np.random.Generator, number: int) -> Motion:
+def _inertial(_: np.random.Generator, number: int) -> Motion:
     """One of six, as they are slow."""
     return _inertial_of(number // 3 % 6)
 
@@ -289,7 +290,7 @@ def _inertial_of(number: int) -> Motion:
         return _slider(rng, mass=10 ** rng.uniform(-8, -6))
 
 
-def _rough(rng: np.random.Generator, number: int) -> Motion:
+def _rough(rng: np.random.Generator, _: int) -> Motion:
     """A strength that varies along the track as a sum of waves."""
     lengths = np.exp(rng.uniform(math.log(8), math.log(300), 40))
     phases, wave = rng.uniform(0, 2 * math.pi, 40), 2 * math.pi / lengths
@@ -302,7 +303,7 @@ def _rough(rng: np.random.Generator, number: int) -> Motion:
     return _slider(rng, track=track)
 
 
-def _jerky(rng: np.random.Generator, number: int) -> Motion:
+def _jerky(rng: np.random.Generator, _: int) -> Motion:
     """Lines of loading between falls by half a cosine, of lognormal sizes, with ringing.
 
     With small intervals the next fall begins soon after the end of the one before.
@@ -461,7 +462,7 @@ def table(judgements: Iterable[Judgement]) -> str:
         np.concatenate([getattr(one, name) for one in every])
         for name in ("drop", "is_found", "found_drop", "is_right")
     )
-    for low, high in zip(CLASSES[:-1], CLASSES[1:], strict=True):
+    for low, high in itertools.pairwise(CLASSES):
         inside = (drop >= low) & (drop < high)
         found = (found_drop >= low) & (found_drop < high)
         rows.append(

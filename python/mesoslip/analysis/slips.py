@@ -300,8 +300,9 @@ def _stick_columns(
 def counts(tree: Tree) -> dict[str, Any] | None:
     """Numbers of slips of a measured trace by minimum fall; None for runs.
 
-    ``used`` is the minimum fall of the catalogue. ``plateau`` is the range in which the number
-    hardly changes and at whose start it lies, or None.
+    ``used`` is the minimum fall of the catalogue. ``mirrored_count`` is what noise makes.
+    ``plateau`` is the range, from the automatic minimum on, in which the number hardly changes, or
+    None.
     """
     if "slip_counts" not in tree.children:
         return None
@@ -310,6 +311,26 @@ def counts(tree: Tree) -> dict[str, Any] | None:
     return {
         "min_fall": data["min_fall"].values.tolist(),
         "slip_count": data["slip_count"].values.tolist(),
+        **(
+            {"mirrored_count": data["mirrored_count"].values.tolist()}
+            if "mirrored_count" in data
+            else {}
+        ),
         "used": float(data.attrs["used"]),
         "plateau": None if plateau is None else [float(one) for one in plateau],
     }
+
+
+def printed_counts(found: dict[str, Any], unit: str) -> PrintedTable:
+    """The numbers of slips by minimum fall as a table for print; the unit is that of the force."""
+    falls = column(found["min_fall"], unit, 3)
+    mirrored = found.get("mirrored_count", [0] * len(found["min_fall"]))
+    rows = zip(found["min_fall"], found["slip_count"], mirrored, strict=True)
+    return PrintedTable(
+        "Slips by minimum fall",
+        (falls.head("minimum fall"), "slips", "mirrored", ""),
+        tuple(
+            (falls.text(fall), str(slips), str(noise), "used" if fall == found["used"] else "")
+            for fall, slips, noise in rows
+        ),
+    )

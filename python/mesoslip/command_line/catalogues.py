@@ -19,7 +19,7 @@ from mesoslip.command_line.options import (
     time_of,
     write_table,
 )
-from mesoslip.quantities import column, with_error
+from mesoslip.quantities import with_error
 
 # Numbers of rows that are printed of a table with many more, at its beginning and end.
 FIRST, LAST = 20, 5
@@ -70,20 +70,13 @@ def slips(
 
 def _print_counts(counts: dict[str, Any], unit: str) -> None:
     """Print the number of slips over the minimum fall, with a warning if it has no plateau."""
+    from mesoslip.analysis import slips as catalogues
+
     if not counts["min_fall"]:
         return
-    falls = column(counts["min_fall"], unit, 3)
-    used = counts["used"]
+    table = catalogues.printed_counts(counts, unit)
     typer.echo("")
-    print_table(
-        [
-            [falls.head("minimum fall"), "slips", ""],
-            *(
-                [falls.text(fall), str(count), "used" if fall == used else ""]
-                for fall, count in zip(counts["min_fall"], counts["slip_count"], strict=True)
-            ),
-        ]
-    )
+    print_table((table.head, *table.rows))
     if counts["plateau"] is None and any(counts["slip_count"]):
         typer.echo(
             "warning: the number of slips depends on the minimum fall everywhere; falls that stand "

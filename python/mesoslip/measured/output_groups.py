@@ -63,7 +63,11 @@ def noise_group(noise: TraceNoise, unit: str) -> xr.Dataset:
 def count_group(found: FoundSlips, unit: str) -> xr.Dataset:
     """Numbers of slips by minimum fall, with the minimum fall of the catalogue."""
     counts = found.counts
-    columns = {"min_fall": counts.threshold, "slip_count": counts.count}
+    columns = {
+        "min_fall": counts.threshold,
+        "slip_count": counts.count,
+        "mirrored_count": counts.mirrored_count,
+    }
     data = _group(variables.SLIP_COUNTS, columns, "threshold", unit)
     data.attrs["used"] = found.min_fall
     if counts.plateau is not None:

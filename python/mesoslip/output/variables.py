@@ -177,6 +177,9 @@ NOISE = Group(
 SLIP_COUNTS = Group(
     min_fall=Meaning("N", "minimum fall of the force in a slip"),
     slip_count=Meaning("1", "number of slips with that minimum fall", np.int64),
+    mirrored_count=Meaning(
+        "1", "steep falls of the trace mirrored in its loading, as many as noise makes", np.int64
+    ),
 )
 
 STAGES = Group(

@@ -120,11 +120,16 @@ def classify(
     is_renewed = moved >= scales.renewal_displacement
     result = RegimeResult(**numbers)  # type: ignore[arg-type]
     regular = SMOOTH_AMPLITUDE * scale / static
+    judged = result
+    if scales.is_measured and are_slips:
+        # Slips that stand out of the noise are no smooth sliding, however small.
+        judged, regular = replace(result, smooth_amplitude=0.0), 0.0
     regime = _regime(
-        result, [one / static for one in halves], regular=regular, is_renewed=is_renewed
+        judged, [one / static for one in halves], regular=regular, is_renewed=is_renewed
     )
-    # A prescribed slider neither sticks nor slips.
-    if scales.is_rigid and regime in {STICK_SLIP, IRREGULAR}:
+    # A prescribed slider neither sticks nor slips, nor does a measured one without slips.
+    never_slips = scales.is_rigid or (scales.is_measured and not len(slips))
+    if never_slips and regime in {STICK_SLIP, IRREGULAR}:
         regime = SMOOTH
     return replace(result, regime=regime)
 

@@ -31,7 +31,7 @@ NOISE_RATIOS, NOISE_FALLS = 0.85, 0.7
 MAX_COHERENCE, MAX_EVENTS = 0.7, 1000
 # Number of mirrored slips at which noise dominates, and smaller minimum falls are not tried.
 MAX_NOISE = 50
-# A plateau: maximum change of the count, and minimum ratio of its thresholds.
+# A plateau: maximum relative change of the count, at least 1, and minimum ratio of its thresholds.
 MAX_CHANGE, MIN_PLATEAU = 0.1, 1.5
 
 
@@ -42,8 +42,8 @@ class SlipCounts:
     threshold: Array = field(default_factory=lambda: np.empty(0))
     """Minimum falls, in the unit of the force."""
     count: NDArray[np.int_] = field(default_factory=lambda: np.empty(0, dtype=int))
-    noise_count: NDArray[np.int_] = field(default_factory=lambda: np.empty(0, dtype=int))
-    """Numbers in the trace mirrored in its loading, which are of noise."""
+    mirrored_count: NDArray[np.int_] = field(default_factory=lambda: np.empty(0, dtype=int))
+    """Numbers of steep falls in the trace mirrored in its loading, as many as noise makes."""
     plateau: tuple[float, float] | None = None
     """First and last minimum fall of the range in which the number hardly changes, if any."""
 
@@ -67,10 +67,16 @@ def chosen(every: Sequence[Level]) -> Choice:
 
 
 def _persistence(choice: Choice) -> float:
-    """Number of slips times the length of its plateau, in steps of the threshold."""
+    """Number of slips times the length of its plateau, in steps of the minimum fall.
+
+    0 if the median is wider than half the time between slips.
+    """
+    waiting = np.diff(choice.level.trace.time[choice.tops])
+    if waiting.size and choice.level.width > float(np.median(waiting)) / 2:
+        return 0.0
     plateau = choice.counts.plateau
-    length = 0.0 if plateau is None else math.log(plateau[1] / plateau[0], THRESHOLD_RATIO)
-    return choice.tops.size * (1 + length)
+    length = 1.0 if plateau is None else plateau[1] / plateau[0]
+    return choice.tops.size * (1 + math.log(length, THRESHOLD_RATIO))
 
 
 def _at(level: Level) -> Choice:
@@ -91,7 +97,7 @@ def _at(level: Level) -> Choice:
     count, noise = count.astype(int), noise.astype(int)
     for at, threshold in enumerate(thresholds.tolist()):
         # Up to where the number is about the same.
-        same = count[at:] >= (1 - MAX_CHANGE) * count[at]
+        same = count[at:] >= count[at] - max(1.0, MAX_CHANGE * count[at])
         last = at + (int(np.argmin(same)) if not same.all() else len(same)) - 1
         plateau = None
         if thresholds[last] >= MIN_PLATEAU * threshold:
@@ -102,7 +108,9 @@ def _at(level: Level) -> Choice:
             counts = SlipCounts(thresholds, count, noise, plateau)
             return Choice(level, threshold, *level.slips(threshold), counts)
     nothing = np.empty(0, dtype=int)
-    return Choice(level, max(level.floor, deepest), nothing, nothing, SlipCounts(thresholds, count, noise))
+    return Choice(
+        level, max(level.floor, deepest), nothing, nothing, SlipCounts(thresholds, count, noise)
+    )
 
 
 def _stands_out(level: Level, threshold: float, is_one_sided: bool) -> bool:

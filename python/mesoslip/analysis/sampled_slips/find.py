@@ -83,9 +83,10 @@ def find_slips(
         min_fall = choice.min_fall
     else:
         # The widest median that hardly changes a fall.
-        found = fall_period(time, level.trace.force, tops, bottoms)
-        level = [one for one in every if one is every[0] or one.width <= found / 4][-1]
-        tops, bottoms = level.trace.falls(min_fall)
+        whole = every[0].trace
+        widest = fall_period(time, whole.force, *whole.exceeding(min_fall)) / 4
+        level = [one for one in every if one is every[0] or one.width <= widest][-1]
+        tops, bottoms = level.trace.exceeding(min_fall)
     if tops.size == 0:
         return _none(period, min_fall, choice.counts)
     if period is None:

@@ -61,16 +61,20 @@ class Side:
         return extremes_of(self.force)
 
     def falls(self, threshold: float) -> tuple[Samples, Samples]:
-        """Samples of maximum and minimum of the falls that exceed the rebound before by a threshold.
+        """Samples of maximum and minimum of falls above a threshold, but for very slow ones."""
+        if threshold not in self._falls:
+            tops, bottoms = self.exceeding(threshold)
+            duration = self.time[bottoms] - self.time[tops]
+            rates = (self.force[tops] - self.force[bottoms]) / duration
+            kept = rates >= MIN_RATE * self._deepest_rate
+            self._falls[threshold] = tops[kept], bottoms[kept]
+        return self._falls[threshold]
+
+    def exceeding(self, threshold: float) -> tuple[Samples, Samples]:
+        """Samples of maximum and minimum of falls that exceed rebounds by a threshold.
 
         A fall from the first sample on has no start.
         """
-        force, time = self.force, self.time
-        if threshold not in self._falls:
-            self._falls[threshold] = self._exceeding(threshold)
-        return self._falls[threshold]
-
-    def _exceeding(self, threshold: float) -> tuple[Samples, Samples]:
         force = self.force
         tops, bottoms = self.extremes.falls(threshold)
         if tops.size == 0:
@@ -84,8 +88,6 @@ class Side:
                 self._before[top, bottom] = low
                 rebound = self._rebound(low, top, bottom)
                 kept[at] = force[top] - force[bottom] - MIN_FALL_RATIO * rebound > threshold
-        rates = (force[tops] - force[bottoms]) / (self.time[bottoms] - self.time[tops])
-        kept &= rates >= MIN_RATE * self._deepest_rate
         return tops[kept], bottoms[kept]
 
     @cached_property
@@ -113,12 +115,12 @@ class Side:
         first = max(low, int(np.searchsorted(time, time[top] - duration)))
         lowest = first + int(np.argmin(self.force[first : top + 1]))
         rise = float(self.force[top] - self.force[lowest])
-        if rise <= MAX_LOADING * self._rising * (time[top] - time[lowest]):
+        if lowest == top or rise <= MAX_LOADING * self._rising * (time[top] - time[lowest]):
             return 0.0
         return max(rise - self.floor / 2, 0.0)
 
     def ratios(self, tops: Samples, bottoms: Samples) -> Array:
-        """Duration of the rise to the maximum of each fall over that of the fall, in the upper part."""
+        """Duration of the rise before each fall over that of the fall, in the upper part."""
         pairs = list(zip(tops.tolist(), bottoms.tolist(), strict=True))
         for one in pairs:
             if one not in self._ratios:
@@ -232,7 +234,9 @@ def levels(
         noise_range = _noise_range(len(force) / width) * deviation
         floor = max(noise_range, height)
         reach = min(max(SLOPE_SAMPLES, SLOPE_WIDTHS * width), len(force) - 1)
-        slope = float(np.median((filtered[reach:] - filtered[:-reach]) / (time[reach:] - time[:-reach])))
+        slope = float(
+            np.median((filtered[reach:] - filtered[:-reach]) / (time[reach:] - time[:-reach]))
+        )
         trace = Side(time, filtered, loading_rate, period, floor)
         mirrored = 2 * slope * (time - time[0]) - filtered
         mirror = Side(time, mirrored, loading_rate, period, floor, trace)

@@ -8,7 +8,13 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from mesoslip.analysis.slips import Catalogue, as_recorded, catalogue_of
+from mesoslip.analysis.slips import (
+    Catalogue,
+    as_recorded,
+    catalogue_of,
+    counts,
+    printed_counts,
+)
 from mesoslip.output.access import group_of
 from mesoslip.plots.lines import max_size
 from mesoslip.plots.style import curve_color
@@ -35,6 +41,10 @@ COLUMNS = {
 }
 # Columns of which there are histograms.
 DISTRIBUTIONS = ("force_drop", "duration", "waiting_time")
+COUNTS_NOTE = (
+    "Number of slips by minimum fall. Mirrored: steep falls of the trace mirrored in its loading, "
+    "as many as noise makes."
+)
 STATISTICS = ("mean", "standard_deviation", "minimum", "maximum")
 
 
@@ -51,6 +61,10 @@ def slips(subjects: Sequence[Subject]) -> Section | None:
     found = [catalogue_of(one.tree) for one in with_slips]
     for subject, catalogue in zip(with_slips, found, strict=True):
         blocks += _statistics(subjects, subject, catalogue)
+        by_fall = counts(subject.tree)
+        if by_fall is not None and any(by_fall["slip_count"]):
+            table = printed_counts(by_fall, catalogue.force_unit)
+            blocks.append(Table(table.head, table.rows, COUNTS_NOTE))
     if any(group_of(one.tree, "slips").sizes["slip"] > 1 for one in with_slips):
         blocks.append(drawn("Distributions of the slips", lambda: _histograms(with_slips, found)))
     if len(subjects) == 1:

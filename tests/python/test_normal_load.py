@@ -399,3 +399,13 @@ def test_reports_and_pictures_have_the_load():
     assert "between 400 mN and 1.6 N at 100 1/s" in sentence
     assert "normal force" in caption(mesoslip.run(config))
     assert "normal force" not in caption(mesoslip.run(configuration("rigid")))
+
+
+def test_what_continues_or_repeats_needs_a_constant_load():
+    config = configuration("rigid, me", **VIBRATING, drive={"velocity": 1e-5}, run__duration=0.1)
+    with pytest.raises(ConfigError, match="load: has no settled cycle"):
+        mesoslip.cycle(config)
+    sweep = {"continue": "drive.velocity", "measures": ["mean_force"]}
+    tables = config.to_dict() | {"sweep": sweep | {"grid": {"drive.velocity": [1e-5, 2e-5]}}}
+    with pytest.raises(ConfigError, match="must be constant with sweep.continue"):
+        mesoslip.sweep(tables)

@@ -55,6 +55,9 @@ def unchained(combinations: Sequence[Combination], key: str, source: str) -> Ite
         if kind is not None:
             message = f"slider.stiffness needs a slider of kind 'rigid', not {kind!r}"
             yield Problem(source, "sweep.continue", message)
+    if any(one.pressing.varies for one in configs):
+        message = "must be constant with sweep.continue: its stages start with a run"
+        yield Problem(source, "load", message)
     stops: dict[str, list[float | None]] = {
         "run.avalanches": [one.run.avalanches for one in configs],
         "run.stop.displacement": [one.run.stops.displacement for one in configs],

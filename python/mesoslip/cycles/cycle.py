@@ -239,6 +239,9 @@ def _master_equation(config: Config) -> Config:
         problems.append(
             Problem("", "contacts.track", "has no settled cycle: no two slips are on one place")
         )
+    if config.pressing.varies:
+        message = "has no settled cycle: it must be constant, with normal_force alone"
+        problems.append(Problem("", "load", message))
     if not config.contacts.reattach:
         problems.append(
             Problem("", "contacts.reattach", "a cycle needs contacts that attach again")

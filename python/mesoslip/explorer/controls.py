@@ -286,7 +286,7 @@ CONTROLS = (
         is_switch=True,
     ),
     Control("load.normal_force", "normal force L_0", 1.5),
-    Control("load.cycle.amplitude", "amplitude of the load", 1.5),
+    Control("load.cycle.amplitude", "amplitude of the load", 0.35, usual=0.4),
     Control("load.cycle.frequency", "frequency of the load", 2),
     Control(
         "contacts.track",

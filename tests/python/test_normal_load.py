@@ -407,5 +407,5 @@ def test_what_continues_or_repeats_needs_a_constant_load():
         mesoslip.cycle(config)
     sweep = {"continue": "drive.velocity", "measures": ["mean_force"]}
     tables = config.to_dict() | {"sweep": sweep | {"grid": {"drive.velocity": [1e-5, 2e-5]}}}
-    with pytest.raises(ConfigError, match="must be constant with sweep.continue"):
+    with pytest.raises(ConfigError, match=r"must be constant with sweep.continue"):
         mesoslip.sweep(tables)

@@ -9,7 +9,7 @@ from mesoslip import _core
 from mesoslip.configuration import arguments
 from mesoslip.configuration.config import Config
 from mesoslip.configuration.kernel_parameters import named
-from mesoslip.errors import ConfigError, MesoslipError, Problem
+from mesoslip.errors import MesoslipError
 
 
 @arguments.checked(
@@ -42,9 +42,7 @@ def track_strength(
     ConfigError
         If there is no track.
     """
-    track = config.contacts.track
-    if track is None:
-        raise ConfigError([Problem("", "contacts.track", "missing: the strength is the same")])
+    track = config.contacts.needed_track
     x, floor = np.asarray(displacement, dtype=np.float64), config.contacts.strength_floor
     # f2py refuses empty arrays.
     values, status, message = _core.track_strength(

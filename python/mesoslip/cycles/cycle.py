@@ -235,10 +235,10 @@ def _master_equation(config: Config) -> Config:
         problems.append(Problem("", "slider.kind", message, config.slider.kind))
     elif len(config.drive_parts) > 1 or not _is_constant(config):
         problems.append(Problem("", "drive", "a cycle needs one constant velocity, not zero"))
-    if config.contacts.track is not None:
-        problems.append(
-            Problem("", "contacts.track", "has no settled cycle: no two slips are on one place")
-        )
+    problems += [
+        Problem("", key, "has no settled cycle: no two slips are on one place")
+        for key in config.contacts.place_keys
+    ]
     if config.pressing.varies:
         message = "has no settled cycle: it must be constant, with normal_force alone"
         problems.append(Problem("", "load", message))

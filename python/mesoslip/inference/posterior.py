@@ -221,8 +221,8 @@ def _notes(fitted: FitResult) -> Iterator[str]:
                 f"{name} of {titles[one.trace]}" for name, one in zip(named, features, strict=True)
             ]
         yield f"left out, as noise dominates: {', '.join(dict.fromkeys(named))}"
-    if fitted.plan.config.contacts.track is not None:
-        yield "each trace is taken to have a track of its own (contacts.track)"
+    if keys := fitted.plan.config.contacts.place_keys:
+        yield f"each trace is taken to have a track of its own ({', '.join(keys)})"
     elif WANDER not in fitted.plan.prior.keys:
         yield "the strength is taken to be the same along the track (fit.wander = false)"
 

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mesoslip.errors import ConfigError
 from mesoslip.output.inputs import ConfigLike, as_config
 from mesoslip.output.provenance import program_attributes
 from mesoslip.output.variables import CRITICAL, CURVE, STRETCHES
@@ -17,7 +16,6 @@ from mesoslip.theory.force_curve import ForceCurve
 if TYPE_CHECKING:
     import xarray as xr
 
-    from mesoslip.configuration.config import Config
 
 # Units and meanings of the summary of a curve.
 SUMMARY = {
@@ -124,21 +122,8 @@ def curve_tree(curve: ForceCurve) -> xr.DataTree:
     children = {"critical": xr.DataTree(critical)}
     if config.curve.density_at:
         children["stretch_density"] = xr.DataTree(_densities(curve))
-    if config.contacts.track is not None:
-        children |= _track_children(config)
+    children |= contact_theory(config).curve_groups()
     return xr.DataTree(root, children=children)
-
-
-def _track_children(config: Config) -> dict[str, xr.DataTree]:
-    """The linear response to the strength along the track, if there is a theory."""
-    import xarray as xr
-
-    from mesoslip.theory.track_response import TrackResponse, track_dataset
-
-    try:
-        return {"track": xr.DataTree(track_dataset(TrackResponse(config)))}
-    except ConfigError:
-        return {}
 
 
 def _densities(curve: ForceCurve) -> xr.Dataset:

@@ -24,7 +24,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from mesoslip.configuration import arguments
 from mesoslip.configuration.config import Config
-from mesoslip.configuration.contacts.tables import Track
 from mesoslip.errors import ConfigError, Problem
 from mesoslip.output.variables import TRACK_RESPONSE
 from mesoslip.theory.contacts.base import KNOWN_KEYS
@@ -75,8 +74,7 @@ class TrackResponse:
         problems = list(_problems(config))
         if problems:
             raise ConfigError(problems)
-        assert config.contacts.track is not None
-        self.track: Track = config.contacts.track
+        self.track = config.contacts.needed_track
         contacts = config.contacts
         self._static, self._stretch = contacts.static_force, contacts.break_stretch
         self._width = contacts.stretch_width
@@ -161,8 +159,6 @@ class TrackResponse:
 def _problems(config: Config) -> Iterator[Problem]:
     """What a linear response to the strength along the track does not know."""
     contacts = config.contacts
-    if contacts.track is None:
-        yield Problem("", "contacts.track", "needed for the response to the strength along it")
     for key in sorted(config.given_contact_keys - KNOWN_KEYS - {"contacts.track"}):
         yield Problem("", key, "has no linear response to the strength along a track")
     if contacts.newborn_width > 0:

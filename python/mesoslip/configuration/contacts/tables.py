@@ -41,7 +41,7 @@ from mesoslip.configuration.threshold_laws.table import (
     sample_problem,
     stretch_cells,
 )
-from mesoslip.errors import FileError
+from mesoslip.errors import ConfigError, FileError, Problem
 from mesoslip.quantities import with_unit
 
 Array = NDArray[np.float64]
@@ -463,6 +463,19 @@ class Contacts(Table):
                 "attached along a breaking stretch, over which shorter variations average out",
             )
         return self
+
+    @property
+    def needed_track(self) -> Track:
+        """The track; an error if there is none."""
+        if self.track is None:
+            message = "missing: the strength is the same everywhere"
+            raise ConfigError([Problem("", "contacts.track", message)])
+        return self.track
+
+    @property
+    def place_keys(self) -> tuple[str, ...]:
+        """Keys by which contacts differ from place to place along the track."""
+        return () if self.track is None else ("contacts.track",)
 
     @property
     def strength_floor(self) -> float:

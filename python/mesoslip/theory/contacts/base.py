@@ -11,6 +11,8 @@ from mesoslip.quantities import with_unit
 from mesoslip.theory.quantity import Quantity
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from mesoslip.configuration.config import Config
     from mesoslip.theory.linear_stability import LinearStability
 
@@ -63,6 +65,10 @@ class ContactTheory:
     def check_force_curve(self) -> None:
         """Refuse contacts without a force curve F(X)."""
         self._refuse("no force curve")
+
+    def curve_groups(self) -> dict[str, xr.DataTree]:
+        """Groups of the output of ``mesoslip curve`` beyond those of all kinds, by name."""
+        return {}
 
     def sliding(self, velocity: float | None = None) -> LinearStability:
         """Steady sliding at a velocity [m/s], that of the drive by default, and its stability."""

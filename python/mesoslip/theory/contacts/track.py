@@ -12,6 +12,8 @@ from mesoslip.theory.contacts.plain import PlainTheory
 from mesoslip.theory.quantity import Quantity
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from mesoslip.theory.linear_stability import LinearStability
 
 
@@ -19,10 +21,20 @@ class TrackTheory(PlainTheory):
     """Plain contacts on a track (model section 18)."""
 
     features: ClassVar[frozenset[str]] = frozenset({"contacts.track"})
-    caveat: ClassVar[str] = "computed for the mean strength of contacts.track"
+    kind_caveat: ClassVar[str] = "computed for the mean strength of contacts.track"
 
     def sliding(self, velocity: float | None = None) -> LinearStability:
         return ContactTheory.sliding(self, velocity)
+
+    def curve_groups(self) -> dict[str, xr.DataTree]:
+        import xarray as xr
+
+        from mesoslip.theory.track_response import TrackResponse, track_dataset
+
+        try:
+            return {"track": xr.DataTree(track_dataset(TrackResponse(self.config)))}
+        except ConfigError:
+            return {}
 
     def quantities(self) -> Iterator[Quantity]:
         from mesoslip.theory.track_response import TrackResponse

@@ -86,15 +86,15 @@ def _at(level: Level) -> Choice:
     steps = 0
     if deepest > level.floor > 0:
         steps = math.ceil(math.log(deepest / level.floor) / math.log(THRESHOLD_RATIO))
-    rows = []
+    rows: list[tuple[float, int, int, int]] = []
     for number in reversed(range(steps)):
         threshold = level.floor * THRESHOLD_RATIO**number
-        steep, mirrored = level.steep_counts(threshold)
-        rows.append((threshold, level.slips(threshold)[0].size, steep, mirrored))
-        if mirrored > max(MAX_NOISE, steep / 2):
+        steep_count, mirrored = level.steep_counts(threshold)
+        rows.append((threshold, level.slips(threshold)[0].size, steep_count, mirrored))
+        if mirrored > max(MAX_NOISE, steep_count / 2):
             break
-    thresholds, count, steep, noise = np.array(rows[::-1]).reshape(-1, 4).T
-    count, noise = count.astype(int), noise.astype(int)
+    thresholds: Array = np.array([one[0] for one in rows[::-1]])
+    count, steep, noise = np.array([one[1:] for one in rows[::-1]], dtype=int).reshape(-1, 3).T
     for at, threshold in enumerate(thresholds.tolist()):
         # Up to where the number is about the same.
         same = count[at:] >= count[at] - max(1.0, MAX_CHANGE * count[at])
@@ -139,4 +139,4 @@ def _is_clock(times: Array) -> bool:
     near, width = 1 / float(np.median(np.diff(times))), 1 / float(times[-1])
     frequencies = np.arange(0.8 * near, 1.2 * near, width / 4)
     phases = [abs(np.exp(2j * math.pi * one * times).mean()) for one in frequencies.tolist()]
-    return max(phases) > MAX_COHERENCE
+    return bool(max(phases) > MAX_COHERENCE)

@@ -219,9 +219,10 @@ def levels(
     """The trace after running medians, from narrow to wide, until noise is negligible."""
     parts = parts_of(time)
     interval = max(parts, key=len).interval
-    white, step = noise, 0.0
     if isinstance(noise, TraceNoise):
         white, step = noise.deviation, noise.digital_step
+    else:
+        white, step = noise, 0.0
     for width in WIDTHS:
         if width > 1 and (
             width > len(force) // 8 or (period is not None and width * interval > period / 4)

@@ -37,7 +37,7 @@ class _Locator(LogLocator):
         powers = 10.0 ** np.arange(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
         candidates = [np.unique(np.outer(powers, one).round(12).ravel()) for one in MULTIPLES]
         # Over a few per cent, at equal distances.
-        candidates.append(MaxNLocator(MIN_LABELS + 1).tick_values(low, high))
+        candidates.append(np.asarray(MaxNLocator(MIN_LABELS + 1).tick_values(low, high)))
         for places in candidates:
             inside = places[(places >= low) & (places <= high)]
             if len(inside) >= MIN_LABELS:

@@ -110,7 +110,7 @@ FURTHER: dict[str, dict[str, Any]] = {
     "rigid-track": SLIDERS["rigid"] | {"contacts__track": {"spread": 0.2, "length": 5e-9}},
     "prescribed-ageing-track": SLIDERS["prescribed"]
     | CONTACTS["ageing"]
-    | {"contacts__track": {"spread": 0.2, "length": 5e-9, "correlation": "exponential"}},
+    | {"contacts__track": {"spread": 0.2, "length": 5e-9}},
 }
 # The same of contacts one by one.
 INDIVIDUAL: dict[str, dict[str, Any]] = {

@@ -58,6 +58,7 @@ STARTS = {
     "contacts.thermal.temperature": (*THERMAL, *AT_300_K),
     "contacts.thermal.activation_length": (*THERMAL, *AT_300_K),
     "slider.layer_damping": ("slider.kind=layered", "slider.layers=4"),
+    "contacts.drag": ("contacts.drag_rate=0", "contacts.drag=0.01 N s/m"),
     "slider.damping": ("slider.damping_ratio=none", "slider.damping=20 1/s"),
 }
 

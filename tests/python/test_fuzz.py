@@ -123,8 +123,8 @@ def wait_for_work(process: Command, seconds: float) -> float:
 def test_signals_while_the_output_is_written(number, times, folder):
     """The file becomes whole all the same, and nothing else stays."""
     process = Command(["run", long_run(folder, **FINE), "-o", "out.nc"], folder)
-    wait_for(lambda: list(folder.glob(".*.out.nc")))
-    wait_for(lambda: any(one.stat().st_size > 10**5 for one in folder.glob(".*.out.nc")))
+    wait_for(lambda: list(folder.glob(".mesoslip-*/out.nc")))
+    wait_for(lambda: any(one.stat().st_size > 10**5 for one in folder.glob(".mesoslip-*/out.nc")))
     for _ in range(times):
         process.send(number)
         time.sleep(0.01)

@@ -189,14 +189,20 @@ def test_a_folder_that_vanishes_keeps_no_result_from_the_dataset(tmp_path):
     assert np.isfinite(data["mean_force"]).all()
 
 
+def earlier_output(path):
+    """Write an output; its content."""
+    xr.Dataset(attrs={"configuration": "", "program_version": "1"}).to_netcdf(path)
+    return path.read_bytes()
+
+
 def test_a_folder_that_is_none_is_reported(tmp_path, sweep_file, command):
     output = tmp_path / "sweep.nc"
-    output.write_bytes(b"earlier")
+    earlier = earlier_output(output)
     output.with_name("sweep.points").write_text("a file")
     status, _, printed = command("sweep", sweep_file(SIMPLE), "-o", output)
     assert status == 2
     assert "sweep.points: was not made by this program" in printed
-    assert output.read_bytes() == b"earlier"
+    assert output.read_bytes() == earlier
     status, _, printed = command("sweep", sweep_file(SIMPLE), "-o", output / "in" / "sweep.nc")
     assert status == 2
     assert "cannot be written: Not a directory" in printed
@@ -206,7 +212,7 @@ def test_an_earlier_output_outlives_a_sweep_that_is_stopped(tmp_path, sweep_file
     (tmp_path / "own.py").write_text(OWN)
     (tmp_path / "slow").touch()
     output = tmp_path / "sweep.nc"
-    output.write_bytes(b"earlier")
+    earlier = earlier_output(output)
     process = begin(sweep_file(SLOW), output, "--pool", "threads", "--workers", "2")
     deadline = time.monotonic() + 60
     while not points_of(output):
@@ -215,4 +221,4 @@ def test_an_earlier_output_outlives_a_sweep_that_is_stopped(tmp_path, sweep_file
     process.send_signal(signal.SIGTERM)
     process.communicate(timeout=60)
     assert process.returncode == 143
-    assert output.read_bytes() == b"earlier"
+    assert output.read_bytes() == earlier

@@ -81,7 +81,9 @@ def test_responses_and_avalanches(run, tmp_path, command):
     found = mesoslip.response(run, fit=False)
     mesoslip.write_table(found, tmp_path / "python.tex")
     assert "Steady sliding" in (tmp_path / "python.tex").read_text()
-    with pytest.raises(mesoslip.FileError, match=r"what mesoslip[.]slips, avalanches or response"):
+    with pytest.raises(
+        mesoslip.FileError, match=r"what mesoslip[.]slips, avalanches, response or strokes"
+    ):
         mesoslip.write_table(mesoslip.derived(run), tmp_path / "python.md")
     status, _, error = command("slips", run, "--table", run)
     assert status != 0

@@ -341,4 +341,6 @@ def values(config: Config) -> dict[str, object]:
         given.setdefault("slider.damping_ratio", 0.0)
     if config.contact_kind.on_lattice:
         given.pop("contacts.count")
+    # One of two keys for the drag of detached contacts.
+    given.pop("contacts.drag_rate" if config.contacts.drag > 0 else "contacts.drag")
     return {control.key: given[control.key] for control in CONTROLS if control.key in given}

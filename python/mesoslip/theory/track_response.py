@@ -128,7 +128,7 @@ class TrackResponse:
 
     @arguments.checked(wavenumber=arguments.array)
     def force_spectrum(self, wavenumber: ArrayLike) -> Array:
-        """Spectral density w² |χ|² G of the force [N² m]; its integral over all q is the
+        """Spectral density w² abs(χ)² G of the force [N² m]; its integral over all q is the
         variance."""
         response = np.abs(self.response(wavenumber))
         return np.asarray((self.track.spread * response) ** 2 * self.strength_spectrum(wavenumber))

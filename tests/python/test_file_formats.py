@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import datetime
 
+import nptdms
 import numpy as np
+import openpyxl
 import pytest
 from mesoslip import FileError
 from mesoslip.measured.trace import understand
-
-nptdms = pytest.importorskip("nptdms")
-openpyxl = pytest.importorskip("openpyxl")
 
 COUNT = 300
 SECONDS = 0.01 * np.arange(COUNT)

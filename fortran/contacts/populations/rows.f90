@@ -14,7 +14,7 @@
 !>
 !> With a strength along the track, the thresholds of a population are multiplied by the factor of
 !> the place where it attached. Forces and distances over that factor are those of a population
-!> without one. What is kept are thresholds before it, and energies after it.
+!> without one. Stored thresholds are without the factor, stored energies with it.
 !>
 !> Forces of populations are in units of f_s, their stiffness of k, distances of f_s/k.
 module mesoslip_contacts_populations_rows

@@ -34,7 +34,7 @@ contains
       real(wp) :: force
 
       associate (parameters => self%parameters)
-         ! Also beyond resolution 1, where a coarse run tells the error of another.
+         ! Also beyond resolution 1, where a coarse run is for the error of another.
          force = quiet_part * self%resolution**2 * parameters%count &
             & * parameters%static_force * min(1.0_wp, self%pinned%activation%width)
       end associate

@@ -1,4 +1,4 @@
-"""What is measured of each slip: its ends, its duration, its rate."""
+"""Measured properties of each slip: its ends, its duration, its rate."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 """Strokes of a record that goes back and forth: pieces between its reversals, slips in them, and
-what is measured of strokes and cycles."""
+measured properties of strokes and cycles."""
 
 from mesoslip.analysis.strokes.catalogue import (
     Strokes,

@@ -1,4 +1,4 @@
-"""What is measured of a stroke.
+"""Measured properties of a stroke.
 
 The friction is the mean over the middle of the stroke, as far as it slides there. A stroke begins
 with the reversal, in which sensor and interface are strained from one level of the force to the

@@ -12,6 +12,7 @@ from types import SimpleNamespace
 import mesoslip
 import numpy as np
 import pytest
+import tomli_w
 from conftest import klein_tables, long
 from mesoslip.errors import ConfigError, FileError
 from mesoslip.execution.stop import Stop, StoppedError
@@ -25,6 +26,7 @@ from mesoslip.inference.sampler import draw, r_hat
 from mesoslip.inference.simulations import Simulations, Simulator
 from mesoslip.inference.summaries import Summarizer
 from mesoslip.inference.traced_experiment import prepare
+from mesoslip.output.writing import write
 from scipy.stats import kstest, norm
 
 FREE = {
@@ -48,12 +50,13 @@ FEW = 150
 def few_simulations():
     """Fits with few simulations, short chains and few predictions, for tests of whole fits."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("mesoslip.inference.fit_plan.MIN_SIMULATIONS", FEW)
+        patch.setattr("mesoslip.inference.fit_plan.MIN_SIMULATIONS", 100)
         patch.setattr(rounds, "MIN_FIRST", 50)
         patch.setattr(rounds, "MIN_NEXT", 30)
         patch.setattr(sampler, "BURN_IN", 60)
         patch.setattr(sampler, "THIN", 4)
         patch.setattr("mesoslip.inference.fit.PREDICTIONS", 60)
+        patch.setattr("mesoslip.inference.predict.PREDICTIONS", 60)
         yield
 
 
@@ -313,14 +316,15 @@ def test_a_trace_without_slips_has_no_summaries_of_slips():
 
 @pytest.fixture(scope="module")
 def small_fit(tmp_path_factory):
-    """The trace of the small experiment, and its posterior."""
+    """The trace of the small experiment, its posterior, and a folder with the simulations."""
     folder = tmp_path_factory.mktemp("fit")
-    tree = experiment()
+    trace = folder / "trace.nc"
+    write(experiment(), trace)
     with few_simulations():
         posterior = mesoslip.fit(
-            tree, fit_tables(simulations=FEW), store=folder / "kept", executor=1
+            trace, fit_tables(simulations=FEW), store=folder / "kept", executor=1
         )
-    return tree, posterior, folder
+    return trace, posterior, folder
 
 
 def test_the_truth_lies_in_the_posterior(small_fit):
@@ -352,9 +356,9 @@ def test_a_report_reports_the_parameters(small_fit, tmp_path):
         mesoslip.plot([posterior, posterior])
 
 
-def test_the_same_seed_gives_the_same_posterior(small_fit):
-    """With any number of workers, and after a stop at any time."""
-    tree, posterior, folder = small_fit
+def test_the_same_seed_gives_the_same_posterior(small_fit, tmp_path, command, monkeypatch):
+    """By the command, with any number of workers, and after a stop at any time."""
+    trace, posterior, _ = small_fit
     stop = Stop()
     done = []
 
@@ -363,18 +367,36 @@ def test_the_same_seed_gives_the_same_posterior(small_fit):
         if part > 0.4:
             stop.set()
 
-    store, tables = folder / "stopped", fit_tables(simulations=FEW)
+    config, output = tmp_path / "fit.toml", tmp_path / "posterior.nc"
+    config.write_text(tomli_w.dumps(fit_tables(simulations=FEW)))
+    store = tmp_path / "posterior.simulations"
     with few_simulations(), pytest.raises(StoppedError):
-        mesoslip.fit(tree, tables, store=store, executor=2, progress=watch, stop=stop)
+        mesoslip.fit(trace, config, store=store, executor=2, progress=watch, stop=stop)
     assert store.exists()
     again = []
-    with few_simulations():
-        resumed = mesoslip.fit(
-            tree, tables, store=store, executor=2, progress=lambda part: again.append(part)
-        )
+    line = ("fit", trace, config, "-o", output, "--quiet", "--workers", 2)
+    with few_simulations(), pytest.MonkeyPatch.context() as patch:
+        simulated = Simulator.forces
+        patch.setattr(Simulator, "forces", lambda *of: again.append(1) or simulated(*of))
+        status, printed, _ = command(*line)
+    assert status == 0
     assert len(again) < 0.85 * len(again + done)
+    assert "contacts.static_force" in printed
+    assert "µN" in printed
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["fit.toml", "posterior.nc"]
+    resumed = mesoslip.open_output(output)
     for key in FREE:
         np.testing.assert_array_equal(resumed["posterior"][key], posterior["posterior"][key])
+    picture = tmp_path / "posterior.png"
+    assert command("plot", output, "-o", picture)[0] == 0
+    assert picture.stat().st_size > 20_000
+    # The same posterior, which is not computed again.
+    monkeypatch.setattr(fit_trace, "fit", lambda *_, **__: resumed)
+    with few_simulations():
+        status, printed, _ = command(*line, "--json")
+    assert status == 0
+    row = json.loads(printed)["parameters"]["contacts.delay"]
+    assert row["interval_90"][0] < row["median"] < row["interval_90"][1]
 
 
 @pytest.mark.parametrize("damage", ["brackets", "digits", "number", "none", "cut"])
@@ -401,19 +423,19 @@ def test_damaged_simulations_are_made_again(damage, small_fit, tmp_path):
 
 
 def test_simulations_of_another_fit_are_refused(small_fit):
-    tree, _, folder = small_fit
+    trace, _, folder = small_fit
     with pytest.raises(FileError, match="of another configuration, trace or version"):
-        mesoslip.fit(tree, fit_tables(seed=2), store=folder / "kept")
+        mesoslip.fit(trace, fit_tables(seed=2), store=folder / "kept")
     (folder / "file").write_bytes(b"PK\x03\x04")
     with pytest.raises(FileError, match="was not made by this program"):
-        mesoslip.fit(tree, fit_tables(), store=folder / "file")
+        mesoslip.fit(trace, fit_tables(), store=folder / "file")
 
 
 def test_another_mass_is_no_part_of_the_model():
     """The waveform of slips of a trace of four times the mass disagrees."""
     tree = experiment(slider__mass=4 * 1.47e-3)
     with few_simulations():
-        posterior = mesoslip.fit(tree, fit_tables(simulations=FEW))
+        posterior = mesoslip.fit(tree, fit_tables(simulations=100), executor=1)
     assert posterior.attrs["agreement_probability"] < checks.REJECTED
     assert "no parameters in the ranges describe the trace" in posterior.attrs["warnings"]
 
@@ -474,38 +496,6 @@ def test_warnings_report_what_is_not_determined():
     assert "d lies at the end of its range: widen fit.free.d.to" in printed
     assert "a is not" not in printed
     assert "describe the trace" not in printed
-
-
-def test_the_command_fits_and_draws(tmp_path, command, monkeypatch):
-    trace = tmp_path / "trace.csv"
-    tree = experiment()
-    force = tree["spring_force"].values[0]
-    trace.write_text("force [nN]\n" + "".join(f"{1e9 * one:.1f}\n" for one in force))
-    output, config = tmp_path / "trace.nc", tmp_path / "fit.toml"
-    assert command("trace", trace, "--rate", "500 1/s", "-o", output)[0] == 0
-    import tomli_w
-
-    config.write_text(tomli_w.dumps(fit_tables(simulations=FEW)))
-    posterior = tmp_path / "posterior.nc"
-    with few_simulations():
-        status, printed, _ = command("fit", output, config, "-o", posterior, "--quiet")
-    assert status == 0
-    assert "contacts.static_force" in printed
-    assert "µN" in printed
-    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(
-        ["trace.csv", "trace.nc", "fit.toml", "posterior.nc"]
-    )
-    picture = tmp_path / "posterior.png"
-    assert command("plot", posterior, "-o", picture)[0] == 0
-    assert picture.stat().st_size > 20_000
-    # The same posterior, which is not computed again.
-    again = mesoslip.open_output(posterior)
-    monkeypatch.setattr(fit_trace, "fit", lambda *_, **__: again)
-    with few_simulations():
-        status, printed, _ = command("fit", output, config, "-o", posterior, "--quiet", "--json")
-    assert status == 0
-    row = json.loads(printed)["parameters"]["contacts.delay"]
-    assert row["interval_90"][0] < row["median"] < row["interval_90"][1]
 
 
 @pytest.mark.parametrize(

@@ -240,7 +240,7 @@ def two_traces(tmp_path_factory):
 
         write(tree, paths[-1])
     with few_simulations():
-        tables = fit_tables(free=FREE | STIFFNESS, simulations=200)
+        tables = fit_tables(free=FREE | STIFFNESS, simulations=140)
         return paths, mesoslip.fit(paths, tables, executor=1)
 
 
@@ -292,13 +292,16 @@ def test_a_trace_that_was_not_in_the_fit_is_predicted(two_traces, tmp_path, comm
     other = experiment(
         slider__stiffness=120.0, run__duration=3.0, contacts__static_force=24e-6, run__seed=8
     )
-    predicted = mesoslip.predict(posterior, same, executor=1)
+    with few_simulations():
+        predicted = mesoslip.predict(posterior, same, executor=1)
     assert predicted.attrs["agreement_probability"] > 0.02
     assert "1.237 times that of the fit: the trace declares 120 N/m" in predicted.attrs["notes"]
     files = [tmp_path / "fit.nc", tmp_path / "other.nc", tmp_path / "predicted.nc"]
     write(posterior, files[0])
     write(other, files[1])
-    status, printed, _ = command("fit", files[0], "--predict", files[1], "-o", files[2], "--quiet")
+    line = ("fit", files[0], "--predict", files[1], "-o", files[2], "--quiet")
+    with few_simulations():
+        status, printed, _ = command(*line)
     assert status == 0
     assert "warning: In the model" in printed
     assert "the trace declares 120 N/m" in printed

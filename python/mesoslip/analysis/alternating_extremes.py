@@ -43,6 +43,15 @@ class Extremes:
         steps = np.diff(self.values[self.rest])
         return np.sort(np.concatenate([self._cycle_sizes, -steps[steps < 0]]))
 
+    @cached_property
+    def _sizes(self) -> Array:
+        steps: Array = np.abs(np.diff(self.values[self.rest]))
+        return np.sort(np.concatenate([self._cycle_sizes, steps]))
+
+    def rank(self, threshold: float) -> int:
+        """Number of differences up to a threshold: the falls above thresholds of one rank agree."""
+        return int(np.searchsorted(self._sizes, threshold, side="right"))
+
     def falls(self, threshold: float) -> tuple[Samples, Samples]:
         """Samples of the maximum and of the minimum of each fall above a threshold.
 

@@ -52,6 +52,7 @@ class Side:
     original: Side | None = None
     """The trace, of a mirror image."""
     _falls: dict[float, tuple[Samples, Samples]] = field(default_factory=dict)
+    _excess: dict[int, tuple[Samples, Samples, Array]] = field(default_factory=dict)
     _ratios: dict[tuple[int, int], float] = field(default_factory=dict)
     _before: dict[tuple[int, int], int] = field(default_factory=dict)
 
@@ -75,20 +76,24 @@ class Side:
 
         A fall from the first sample on has no start.
         """
-        force = self.force
-        tops, bottoms = self.extremes.falls(threshold)
-        if tops.size == 0:
-            return tops, bottoms
-        before = np.concatenate([[int(np.argmin(force[: tops[0] + 1]))], bottoms[:-1]])
-        kept = tops > 0
-        for at, (low, top, bottom) in enumerate(
-            zip(before.tolist(), tops.tolist(), bottoms.tolist(), strict=True)
-        ):
-            if kept[at]:
+        rank = self.extremes.rank(threshold)
+        if rank not in self._excess:
+            self._excess[rank] = self._excess_of(*self.extremes.falls(threshold))
+        tops, bottoms, excess = self._excess[rank]
+        kept = excess > threshold
+        return tops[kept], bottoms[kept]
+
+    def _excess_of(self, tops: Samples, bottoms: Samples) -> tuple[Samples, Samples, Array]:
+        """Falls in their order, and their depths without those of the rebounds before."""
+        force, excess = self.force, np.full(tops.size, -np.inf)
+        low = int(np.argmin(force[: tops[0] + 1])) if tops.size else 0
+        for at, (top, bottom) in enumerate(zip(tops.tolist(), bottoms.tolist(), strict=True)):
+            if top > 0:
                 self._before[top, bottom] = low
                 rebound = self._rebound(low, top, bottom)
-                kept[at] = force[top] - force[bottom] - MIN_FALL_RATIO * rebound > threshold
-        return tops[kept], bottoms[kept]
+                excess[at] = force[top] - force[bottom] - MIN_FALL_RATIO * rebound
+            low = bottom
+        return tops, bottoms, excess
 
     @cached_property
     def _deepest_rate(self) -> float:

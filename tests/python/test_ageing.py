@@ -58,7 +58,7 @@ def may_age(kind):
 
 
 # Ways to attach, to end and to start: one law is enough for them.
-LIKE_OTHERS = ("realizations", "steady", "bundle", "delays", "to a", "bdf", "to a slip")
+LIKE_OTHERS = ("realizations", "steady", "bundle", "delays", "to a", "bdf", "load", "lattice")
 
 
 @pytest.mark.parametrize(

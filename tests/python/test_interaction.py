@@ -105,13 +105,13 @@ def test_events_are_those_of_forces_recomputed_at_every_event(klein, kind, size,
     ],
 )
 def test_quasistatic_avalanches_are_those_of_forces_recomputed_at_every_event(klein, changes, back):
-    changes = QUASISTATIC | changes | {"contacts__back_force_ratio": back, "run__avalanches": 200}
+    changes = QUASISTATIC | changes | {"contacts__back_force_ratio": back, "run__avalanches": 100}
     config = klein(**changes)
-    expected, oracle = quasistatic(config, 200)
+    expected, oracle = quasistatic(config, 100)
     realization = finish(config)
     expected = np.array(expected)
     if config.contacts.reattach:
-        assert len(expected) == 200
+        assert len(expected) == 100
     else:
         assert sum(expected[:, 2]) == config.contacts.count
         assert realization.ending == "all contacts are broken"

@@ -6,6 +6,7 @@ import mesoslip
 import numpy as np
 import pytest
 import sksundae
+from conftest import long
 from mesoslip import _core
 from mesoslip.output import layout
 from mesoslip.simulation.realization import Realization
@@ -201,13 +202,21 @@ def test_static_stiffness(klein):
 
 
 @pytest.mark.parametrize(
-    "more",
-    [{}, {"base": BASE}, {"layer_damping": 30.0}, {"layer_damping": 30.0, "base": BASE}],
+    ("engine", "layers", "more"),
+    [
+        ("eq", 16, {"base": BASE}),
+        ("eq", 16, {"layer_damping": 30.0}),
+        ("me", 4, {}),
+        ("me", 4, {"layer_damping": 30.0, "base": BASE}),
+        long("eq", 16, {}),
+        long("eq", 16, {"layer_damping": 30.0, "base": BASE}),
+        long("me", 4, {"base": BASE}),
+        long("me", 4, {"layer_damping": 30.0}),
+    ],
 )
-@pytest.mark.parametrize(("engine", "layers"), [("eq", 16), ("me", 4)])
 def test_energy_balance_closes(klein, more, engine, layers):
     slider = layered(layers, **more)
-    realization = finish(klein(slider=slider, run__duration=3.0, run__engine=engine))
+    realization = finish(klein(slider=slider, run__duration=2.2, run__engine=engine))
     assert abs(realization.energy_residual) < (1e-11 if engine == "eq" else 1e-4)
     assert realization.breaks > 4080
 

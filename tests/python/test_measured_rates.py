@@ -185,7 +185,7 @@ def test_errors_know_of_correlated_noise():
     time = np.arange(200.0)
     column = np.ones((200, 1))
     points = Points((), time, 0 * time, time, np.arange(200), column[:, 0], 1.0)
-    for seed in range(20):
+    for seed in range(12):
         rng = np.random.default_rng(seed)
         noise, decay = np.zeros(200), math.exp(-1 / 5)
         noise[0] = rng.standard_normal()

@@ -107,7 +107,7 @@ def own_tables(folder, function, realizations):
 
 def test_a_cluster_gives_the_same(cluster, tmp_path):
     """With outputs of points, whose files only one thread of a process may write."""
-    started = cluster()
+    started = cluster(1)
     plan = Plan.from_dict(tables(realizations=3, traces=True))
     expected = mesoslip.sweep(tables(realizations=3), executor=mesoslip.Threads())
     store = tmp_path / "points"

@@ -22,7 +22,7 @@ __all__ = ["sweep_file"]
 
 def test_kills_lose_nothing_and_repeat_nothing(tmp_path):
     """A short version of tests/resume/kill_sweep.py."""
-    study = Study(tmp_path, 4, np.random.default_rng(3))
+    study = Study(tmp_path, 2, np.random.default_rng(3))
     whole = study.expected()
     study.attack("killed", whole, 3)
     assert study.wrong == []

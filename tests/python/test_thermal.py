@@ -8,6 +8,7 @@ from typing import Any
 import mesoslip
 import numpy as np
 import pytest
+from conftest import long
 from kinds import configuration
 from mesoslip import Config, ConfigError
 from mesoslip.simulation.realization import Realization
@@ -125,8 +126,10 @@ def breaking_stretch(config: Config, contact: int, renewal: int, velocity: float
     return min(threshold, ratio * float(np.logaddexp(0.0, math.log(deviate) - log_reach)))
 
 
-@pytest.mark.parametrize("ratio", [1e-3, 0.04, 1.0])
-@pytest.mark.parametrize("direction", [1, -1])
+@pytest.mark.parametrize(
+    ("ratio", "direction"),
+    [(1e-3, 1), (0.04, -1), (1.0, 1), long(1e-3, -1), long(0.04, 1), long(1.0, -1)],
+)
 def test_breaks_come_where_their_deviates_say(ratio, direction):
     """Exact to rounding, for many lives, far from the start and in both directions."""
     velocity = 0.3
@@ -363,29 +366,24 @@ def test_a_rigid_slider_moves_on_after_a_long_hold(klein):
 
 
 @pytest.mark.parametrize(
-    "changes",
+    ("kind", "rate", "force_ratio"),
     [
-        {"contacts__thermal__force_ratio": 1e-3, "contacts__thermal__rate": 1e-6},
-        {"contacts__thermal__rate": 1e-17},
+        ("rigid", 1e-6, 1e-3),
+        ("layered", 1e-17, 0.05),
+        ("prescribed", 1e-6, 1e-3),
+        ("quasistatic", 1e-17, 0.05),
+        long("rigid", 1e-17, 0.05),
+        long("layered", 1e-6, 1e-3),
+        long("prescribed", 1e-17, 0.05),
+        long("quasistatic", 1e-6, 1e-3),
     ],
-    ids=["force", "rate"],
 )
-@pytest.mark.parametrize("kind", ["rigid", "layered", "prescribed", "quasistatic"])
-def test_without_temperature_it_is_the_model_without(kind, changes):
+def test_without_temperature_it_is_the_model_without(kind, rate, force_ratio):
     """The same contacts break in the same order; only the last digits of times may differ."""
     cold = configuration(kind, contacts__coupling="equal", run__duration=None)
-    warm = Config.from_dict(
-        cold.to_dict()
-        | {
-            "contacts": cold.to_dict()["contacts"]
-            | {
-                "thermal": {
-                    "rate": changes.get("contacts__thermal__rate", 1.0),
-                    "force_ratio": changes.get("contacts__thermal__force_ratio", 0.05),
-                }
-            }
-        }
-    )
+    thermal = {"thermal": {"rate": rate, "force_ratio": force_ratio}}
+    tables = cold.to_dict()
+    warm = Config.from_dict(tables | {"contacts": tables["contacts"] | thermal})
     expected, actual = breaks(cold), breaks(warm)
     assert len(expected) == len(actual)
     first = 300
@@ -425,10 +423,10 @@ def test_fixed_steps_converge_to_events(klein, changes):
     )
     expected = first_breaks(breaks(config))
     errors = []
-    for step in (4e-6, 1e-6):
+    for step in (8e-6, 2e-6):
         _, contacts = fixed_step(config, step)
         errors.append(np.median(np.abs(first_breaks(contacts.events) - expected)))
-    assert errors[1] < 2e-6
+    assert errors[1] < 4e-6
     assert errors[1] < 0.5 * errors[0]
 
 

@@ -8,6 +8,7 @@ from typing import Any
 import mesoslip
 import numpy as np
 import pytest
+from conftest import long
 from kinds import configuration
 from mesoslip import Config, ConfigError, Realization
 from mesoslip.theory.contacts import contact_theory
@@ -52,7 +53,7 @@ def extrapolated_force(velocity: float, distance: float, **changes: Any) -> floa
 
 @pytest.mark.parametrize(("velocity", "force"), [(1e-4, 0.3721068), (1e-2, 0.4634253)])
 def test_steady_force_is_the_closed_form_to_six_digits(velocity, force):
-    assert extrapolated_force(velocity, 120.0) == pytest.approx(force, abs=1e-6)
+    assert extrapolated_force(velocity, 90.0) == pytest.approx(force, abs=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -78,7 +79,7 @@ def test_steady_force_of_other_laws_with_delay_and_back_force(threshold, ratio, 
 
 
 def test_hold_relaxes_as_the_closed_form_over_five_decades():
-    velocity, slide = 1e-2, 3000.0
+    velocity, slide = 1e-2, 1500.0
     times = 10.0 ** np.arange(1, 6)
     stages = [{"duration": slide, "velocity": velocity}]
     stages += [{"duration": one, "velocity": 0.0} for one in np.diff([0.0, *times])]
@@ -137,7 +138,9 @@ def test_a_long_hold_takes_few_steps():
     assert 0 < force[-1] < 0.8 * force[0]
 
 
-@pytest.mark.parametrize("kind", ["rigid, thermal", "layered, thermal", "prescribed, thermal"])
+@pytest.mark.parametrize(
+    "kind", ["rigid, thermal", "layered, thermal", long("prescribed, thermal")]
+)
 def test_errors_are_of_second_order_with_slips_and_reversals(kind):
     """Or smaller: with coarser steps slips come too early or too late."""
     coarse, middle, fine = (

@@ -14,7 +14,7 @@ import xarray as xr
 from conftest import ROOT, klein_tables
 from matplotlib.figure import Figure
 from mesoslip import Config, FileError
-from mesoslip.analysis.rate_and_state import Loading
+from mesoslip.analysis.rate_and_state import Loading, fit_laws
 from mesoslip.analysis.response import line, rows_of, scalars_of, tables
 from mesoslip.analysis.steady_force import steady_mean, transient
 from mesoslip.theory.steady_sliding import sliding_of
@@ -369,7 +369,7 @@ def test_stick_slip_is_stated_and_not_fitted():
     assert "describes no slips" in law["note"]
 
 
-def test_the_command(tmp_path, command):
+def test_the_command(tmp_path, command, monkeypatch):
     path, table = tmp_path / "holds.nc", tmp_path / "table.csv"
     tables = klein_tables(
         contacts__count=50,
@@ -386,6 +386,11 @@ def test_the_command(tmp_path, command):
     )
     (tmp_path / "run.toml").write_text(tomli_w.dumps(tables))
     assert command("run", tmp_path / "run.toml", "-o", path, "--quiet")[0] == 0
+    # Fits of several laws take seconds, and have tests of their own.
+    for module in ("analysis.rate_and_state.rows", "plots.views.response"):
+        monkeypatch.setattr(
+            f"mesoslip.{module}.fit_laws", lambda record, *_: fit_laws(record, ("slip",))
+        )
     status, out, _ = command("response", path, "--json", "--csv", table, "--normal-force", "36 uN")
     assert status == 0
     answer = json.loads(out)

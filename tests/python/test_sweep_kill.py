@@ -22,9 +22,9 @@ __all__ = ["sweep_file"]
 
 def test_kills_lose_nothing_and_repeat_nothing(tmp_path):
     """A short version of tests/resume/kill_sweep.py."""
-    study = Study(tmp_path, 2, np.random.default_rng(3))
+    study = Study(tmp_path, 3, np.random.default_rng(3))
     whole = study.expected()
-    study.attack("killed", whole, 3)
+    study.attack("killed", whole, 2)
     assert study.wrong == []
     assert study.sweep_kills + study.worker_kills > 1
 
@@ -127,7 +127,7 @@ def test_a_point_that_ends_its_workers_fails_alone(tmp_path, sweep_file):
     output = tmp_path / "sweep.nc"
     text = SIMPLE.replace("mean_force", "own.py:deadly").replace('"0.1 ms", ', "")
     path = sweep_file(text)
-    process = begin(path, output, "--pool", "processes", "--workers", "2")
+    process = begin(path, output, "--pool", "processes", "--workers", "1")
     _, printed = process.communicate(timeout=120)
     assert process.returncode == 1
     assert printed.count("3 workers died; the last one was ended by signal 9") == 1

@@ -49,8 +49,10 @@ LONG_PAGES = [
     "how-to/measured-surface.md",
     "how-to/pictures.md",
     "how-to/slide-hold-slide.md",
+    "how-to/which-motion.md",
     "teaching.md",
     "tutorial-fit.md",
+    "tutorial.md",
 ]
 
 # Those that are run without being made shorter too.

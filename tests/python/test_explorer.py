@@ -922,7 +922,8 @@ def test_a_run_is_recorded_for_its_movie(changes, view):
         assert len(times) <= 100
 
 
-def test_a_movie_is_made_or_the_key_is_named():
+def test_a_movie_is_made_or_the_key_is_named(monkeypatch):
+    monkeypatch.setattr("mesoslip.plots.movie.MAX_FRAMES", 10)
     said = []
     movie = movie_of(
         Config.load(KLEIN, (*FAST_MOVIE, "slider.kind=layered", "slider.layers=3")),

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import mesoslip
 import numpy as np
 import pytest
+from conftest import long
 from mesoslip.analysis.regime import IRREGULAR, STICK_SLIP
 
 TEETH = 30
@@ -88,7 +89,8 @@ def test_slips_are_the_cycles_where_the_strength_wanders(tmp_path):
     assert found["period"] == pytest.approx(1, rel=0.02)
 
 
-@pytest.mark.parametrize("name", ["newtons", "coefficients"])
+@pytest.mark.usefixtures("quick_pictures")
+@pytest.mark.parametrize("name", [long("newtons"), "coefficients"])
 def test_commands_from_the_file_to_the_page(tmp_path, command, monkeypatch, name):
     monkeypatch.chdir(tmp_path)
     laboratory = LABORATORIES[name]

@@ -25,8 +25,9 @@ def dispersion(width, law="gaussian"):
 
 
 @pytest.mark.parametrize("law", ["gaussian", "lognormal", "weibull", "exponential"])
-@pytest.mark.parametrize("coupling", ["scaled", "equal"])
-@pytest.mark.parametrize("back", [0.0, 0.1])
+@pytest.mark.parametrize(
+    ("coupling", "back"), [("scaled", 0.1), ("equal", 0.0), long("scaled", 0.0), long("equal", 0.1)]
+)
 def test_stationary_sliding_is_stationary(klein, law, coupling, back):
     """A start in the stationary state stays there, at the force of the closed form."""
     config = klein(
@@ -304,9 +305,14 @@ def test_a_curve_too_long_is_refused(klein):
         ForceCurve(klein(curve={"length": 1.0}))
 
 
-@pytest.mark.parametrize("back", [0.0, 0.1])
 @pytest.mark.parametrize(
-    ("law", "width"), [("weibull", 2.0), ("weibull", 1.3), ("weibull", 1.0), ("exponential", 1.0)]
+    ("law", "width", "back"),
+    [
+        *(("weibull", 2.0, 0.1), ("weibull", 1.3, 0.0)),
+        *(("weibull", 1.0, 0.1), ("exponential", 1.0, 0.0)),
+        *(long("weibull", 2.0, 0.0), long("weibull", 1.3, 0.1)),
+        *(long("weibull", 1.0, 0.0), long("exponential", 1.0, 0.1)),
+    ],
 )
 def test_a_force_that_only_rises_has_no_peak_and_no_instability(klein, law, width, back):
     """Lives the likelier to end the younger they are, equal contacts: ages only grow, K* = 0."""
@@ -378,8 +384,10 @@ def test_a_base_is_in_series_with_the_spring(klein):
 
 
 @pytest.mark.parametrize("law", ["gaussian", "uniform", "lognormal", "weibull"])
-@pytest.mark.parametrize("width", [0.01, 0.1])
-@pytest.mark.parametrize("coupling", ["equal", "scaled"])
+@pytest.mark.parametrize(
+    ("width", "coupling"),
+    [(0.01, "equal"), (0.1, "scaled"), long(0.01, "scaled"), long(0.1, "equal")],
+)
 def test_the_estimate_is_as_near_as_the_verdict_states(klein, law, width, coupling):
     config = klein(
         contacts__threshold={"law": law, "relative_width": width},

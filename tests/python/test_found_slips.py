@@ -7,7 +7,7 @@ import math
 import mesoslip
 import numpy as np
 import pytest
-from conftest import klein_tables
+from conftest import klein_tables, long
 from made_records import judge, made_record
 from mesoslip.analysis.alternating_extremes import extremes_of
 from mesoslip.analysis.rate_and_state import Loading
@@ -126,7 +126,8 @@ def test_noise_alone_and_its_colours_have_no_slips():
         assert len(find_slips(time, 100 + force)) == 0
 
 
-def test_smooth_sliding_with_slowly_varying_noise_has_hardly_any_slips():
+@pytest.mark.parametrize(("repetitions", "max_with_slips"), [(2, 1), long(5, 3)])
+def test_smooth_sliding_with_slowly_varying_noise_has_hardly_any_slips(repetitions, max_with_slips):
     """Noise correlated over more samples than the estimate of noise can see.
 
     Few deep falls may all follow slow rises by chance.
@@ -134,13 +135,13 @@ def test_smooth_sliding_with_slowly_varying_noise_has_hardly_any_slips():
     rng = np.random.default_rng(0)
     time = 1e-2 * np.arange(10_000)
     with_slips = 0
-    for samples in (10, 50, 100, 200) * 5:
+    for samples in (10, 50, 100, 200) * repetitions:
         memory = np.exp(-1 / samples)
         gain = np.sqrt(1 - memory**2)
         varying = lfilter([gain], [1, -memory], rng.standard_normal(time.size + 2000))[2000:]
         noise = 1e-3 * varying + 2e-4 * rng.standard_normal(time.size)
         with_slips += len(find_slips(time, 0.6 + noise)) > 0
-    assert with_slips <= 3
+    assert with_slips <= max_with_slips
 
 
 @pytest.mark.parametrize("evolution", [0.006, 0.015])
@@ -256,7 +257,7 @@ def test_made_records_without_slips(number):
 def test_a_given_minimum_fall_is_obeyed(shape):
     """No other rule vetoes it: falls above it count, with and without asymmetry and noise."""
     rng = np.random.default_rng(1)
-    time = 1e-3 * np.arange(20_000)
+    time = 1e-3 * np.arange(8_000)
     phase = time % 0.1
     force = {
         "oscillation": np.sin(2 * np.pi * time / 0.1),
@@ -265,9 +266,9 @@ def test_a_given_minimum_fall_is_obeyed(shape):
     }[shape]
     found = find_slips(time, force + 0.01 * rng.standard_normal(time.size), min_fall=0.8)
     if shape == "noise":
-        assert len(found) > 10
+        assert len(found) > 4
     else:
-        assert abs(len(found) - 200) <= 1
+        assert abs(len(found) - 80) <= 1
     assert found.min_fall == 0.8
 
 

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from conftest import long
 from mesoslip import Config
 from mesoslip.simulation.realization import Realization
 from mesoslip.simulation.recorded_tables import AVALANCHE_COLUMNS
@@ -175,7 +176,7 @@ def test_no_strength_is_no_interaction(klein):
     ],
     ids=["prescribed", "quasistatic"],
 )
-@pytest.mark.parametrize("kind", ["triangular", "square"])
+@pytest.mark.parametrize("kind", ["triangular", long("square")])
 def test_the_lattice_without_a_pull_is_the_queue_to_the_bit(klein, slider, kind):
     """Bonds of 1e-300 of a contact: two orders of breaking, a tree and a queue, agree."""
     changes = slider | {"contacts__threshold__relative_width": 0.2, "run__duration": 0.4}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import mesoslip
 import numpy as np
 import pytest
+from conftest import long
 from mesoslip.configuration.threshold_laws import LAWS as LAWS_BY_NAME
 from mesoslip.simulation.realization import Realization
 from mesoslip.simulation.recorded_tables import ENERGY_COLUMNS
@@ -41,8 +42,13 @@ def test_slow_sliding_gives_the_stationary_force(klein, law, coupling):
     assert abs(mean - expected) < 4 * error
 
 
-@pytest.mark.parametrize("coupling", ["scaled", "equal"])
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize(
+    ("law", "coupling"),
+    [
+        *((law, "scaled") for law in LAWS),
+        *(("gaussian", "equal") if law == "gaussian" else long(law, "equal") for law in LAWS),
+    ],
+)
 def test_the_delay_weakens_the_force_with_velocity(klein, law, coupling):
     config = klein(
         **PRESCRIBED,

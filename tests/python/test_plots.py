@@ -99,11 +99,21 @@ def test_views_are_complete():
         assert view.summary, view.name
 
 
+PART = {"x": "drive", "end": 0.09}
 NAMES_OF_RUNS = ["several", "layered", "quasistatic", "no slip", "me", "two samples"]
 
 
-@pytest.mark.parametrize("options", [{}, {"x": "drive", "end": 0.09}])
-@pytest.mark.parametrize("name", NAMES_OF_RUNS)
+@pytest.mark.parametrize(
+    ("name", "options"),
+    [
+        (name, {}) if even else long(name, {})
+        for even, name in zip([1, 0] * 3, NAMES_OF_RUNS, strict=True)
+    ]
+    + [
+        long(name, PART) if even else (name, PART)
+        for even, name in zip([1, 0] * 3, NAMES_OF_RUNS, strict=True)
+    ],
+)
 def test_the_picture_of_a_file_is_that_of_its_tree(runs, name, options, tmp_path, monkeypatch):
     """A file is read without xarray where the view needs no more."""
     write(runs[name], tmp_path / "run.nc")

@@ -80,7 +80,7 @@ def test_the_example_of_its_documentation_runs(tmp_path, monkeypatch):
 @pytest.mark.parametrize("kind", list(KINDS))
 def test_tables_that_are_not_drained_stay_empty(kind):
     run = Realization(configuration(kind))
-    run.advance(2000)
+    run.advance(500)
     kernel = run._open()
     for table in set(TABLES) - set(tables_of(run.config)):
         assert not len(kernel.drain(table)), table

@@ -34,7 +34,7 @@ def sliding(klein, **changes):
 @pytest.mark.parametrize(
     ("ageing", "law"),
     [
-        *((None, "fixed"), (LOG, "exponential"), (RELAX, "fixed")),
+        *((None, "fixed"), (LOG, "exponential"), long(RELAX, "fixed")),
         *(long(None, "exponential"), long(LOG, "fixed"), long(RELAX, "exponential")),
     ],
 )

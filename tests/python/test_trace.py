@@ -9,7 +9,7 @@ import re
 import mesoslip
 import numpy as np
 import pytest
-from conftest import ROOT, klein_tables
+from conftest import ROOT, klein_tables, long
 from mesoslip.analysis.noise import noise_level
 from mesoslip.analysis.sampled_slips import estimated_period, find_slips
 from mesoslip.configuration.columns import Quantity, cells_of, find_columns, values_of
@@ -61,8 +61,12 @@ def write(path, text):
     return path
 
 
-@pytest.mark.parametrize("case", CASES)
-@pytest.mark.parametrize("relative_noise", [0.0, 1e-3, 5e-3, 0.015])
+@pytest.mark.parametrize(
+    ("case", "relative_noise"),
+    [(case, noise) for case in CASES for noise in (1e-3, 0.015)]
+    + [("Klein", 0.0), *(long(case, 0.0) for case in CASES if case != "Klein")]
+    + [("Klein", 5e-3), *(long(case, 5e-3) for case in CASES if case != "Klein")],
+)
 def test_slips_of_noisy_traces_are_those_of_the_exact_catalogue(case, relative_noise):
     """Found, missed, spurious; times within a quarter of a period, drops within some noise."""
     config = mesoslip.Config.from_dict(klein_tables(**CASES[case]))

@@ -20,6 +20,8 @@ import xarray as xr
 from conftest import ROOT, klein_tables, long
 from mesoslip.command_line.progress import say
 
+pytestmark = pytest.mark.usefixtures("quick_pictures")
+
 
 @pytest.fixture
 def short(tmp_path):
@@ -28,6 +30,10 @@ def short(tmp_path):
     tables = klein_tables(contacts__count=50, run__duration=2.2, output__slip_interval=1e-3)
     path.write_text(tomli_w.dumps(tables))
     return path
+
+
+# Of a force curve that is computed soon.
+WIDE = ("--set", "contacts.threshold.relative_width=0.1")
 
 
 def test_run_writes_a_cf_file(short, tmp_path, command):
@@ -313,7 +319,6 @@ def test_ctrl_c_keeps_what_there_is(tmp_path):
     mesoslip.plot(tree, tmp_path / "partial.png")
 
 
-@pytest.mark.usefixtures("quick_pictures")
 def test_curve_reports_the_instability(short, tmp_path, command):
     output = tmp_path / "curve.nc"
     changes = ("--set", "curve.density_at=[3e-9]", "--set", "curve.drive_displacement=50 nm")
@@ -330,7 +335,7 @@ def test_curve_reports_the_instability(short, tmp_path, command):
     assert tree["critical"].sizes["point"] >= 2
     assert "potential" in tree.data_vars
     assert tree["stretch_density"]["unbroken_part"].values[0] == pytest.approx(1, abs=1e-9)
-    status, printed, _ = command("curve", short)
+    status, printed, _ = command("curve", short, *WIDE)
     assert status == 0
     assert "K_star_estimate" in printed
     assert command("plot", output)[0] == 0
@@ -338,12 +343,12 @@ def test_curve_reports_the_instability(short, tmp_path, command):
 
 
 def test_a_stiff_spring_has_an_answer(short, command):
-    status, printed, _ = command("curve", short, "--json", "--set", "slider.stiffness=1e6")
+    status, printed, _ = command("curve", short, "--json", "--set", "slider.stiffness=1e6", *WIDE)
     assert status == 0
     summary = json.loads(printed)
     assert summary["stable"] is True
     assert summary["X_c"] is None
-    status, printed, _ = command("onset", short, "--set", "slider.stiffness=1e6")
+    status, printed, _ = command("onset", short, "--set", "slider.stiffness=1e6", *WIDE)
     assert status == 0
     assert "no onset" in printed
 
@@ -370,7 +375,7 @@ def test_the_master_equation_runs_like_contacts(short, tmp_path, command):
 
 def test_a_curve_has_no_slips(short, tmp_path, command):
     output = tmp_path / "curve.nc"
-    assert command("curve", short, "-o", output)[0] == 0
+    assert command("curve", short, "-o", output, *WIDE)[0] == 0
     status, _, printed = command("slips", output)
     assert status == 2
     assert "not an output of mesoslip run" in printed

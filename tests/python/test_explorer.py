@@ -43,6 +43,7 @@ from mesoslip.explorer.session import Session
 from mesoslip.explorer.stages import read_stages
 from mesoslip.output.tree import build_tree
 from mesoslip.plots.close_up import largest_slip, slip_window
+from mesoslip.plots.movie import chosen_frames
 from mesoslip.quantities import with_unit
 from mesoslip.simulation.realization import Realization
 from mesoslip.simulation.run_realizations import Results, run_realizations
@@ -923,7 +924,7 @@ def test_a_run_is_recorded_for_its_movie(changes, view):
 
 
 def test_a_movie_is_made_or_the_key_is_named(monkeypatch):
-    monkeypatch.setattr("mesoslip.plots.movie.MAX_FRAMES", 10)
+    monkeypatch.setattr(chosen_frames, "__defaults__", (10,))
     said = []
     movie = movie_of(
         Config.load(KLEIN, (*FAST_MOVIE, "slider.kind=layered", "slider.layers=3")),

@@ -355,7 +355,8 @@ def test_command_and_run_say_the_same(klein, tmp_path, command):
         sum(int(part.split()[0]) for part in said.splitlines()[-1].split(": ")[1].split(", ")) == 3
     )
     curve = tmp_path / "curve.nc"
-    assert command("curve", str(config), "-o", str(curve))[0] == 0
+    wide = ("--set", "contacts.threshold.relative_width=0.1")
+    assert command("curve", str(config), "-o", str(curve), *wide)[0] == 0
     status, _, said = command("regime", str(curve))
     assert status == 2
     assert "not an output of mesoslip run" in said

@@ -326,7 +326,7 @@ def test_steady_force_of_many_contacts(klein, law, width, velocity):
     ("law", "width", "resolution", "bound"),
     [("gaussian", 0.1, 0.1, 4e-6), ("uniform", 0.2, 0.1, 3e-5), ("weibull", 0.15, 0.1, 1e-5)],
 )
-@pytest.mark.parametrize("velocity", [1e-8, long(1e-7), 1e-6, long(1e-5), 1e-4])
+@pytest.mark.parametrize("velocity", [1e-8, long(1e-7), long(1e-6), long(1e-5), 1e-4])
 def test_steady_force_of_the_master_equation(klein, law, width, resolution, bound, velocity):
     """To five digits; the error falls with the square of the resolution."""
     period = STRETCH / velocity

@@ -422,6 +422,7 @@ def test_slow_decay_at_the_rate_of_linear_theory():
     assert oscillating.amplitude_ratio > 0.1
 
 
+@pytest.mark.long
 def test_slow_decay_is_not_irregular_motion():
     """An oscillation of 12 % of the static force that takes a second to decay, 500 periods of it:
     the first passages change little from one to the next."""

@@ -93,7 +93,7 @@ def test_events_are_those_of_forces_recomputed_at_every_event(klein, kind, size,
     )
 
 
-@pytest.mark.parametrize("back", [0.0, 0.2])
+@pytest.mark.parametrize("back", [long(0.0), 0.2])
 @pytest.mark.parametrize(
     "changes",
     [

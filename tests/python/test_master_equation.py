@@ -70,7 +70,7 @@ def test_forward_sliding_is_the_force_curve(klein, coupling, initial):
     assert errors[1] < 0.45 * errors[0]
 
 
-@pytest.mark.parametrize("back_force_ratio", [0.0, 0.1, 0.5, 0.9])
+@pytest.mark.parametrize("back_force_ratio", [0.0, long(0.1), long(0.5), 0.9])
 @pytest.mark.parametrize("coupling", ["scaled", "equal"])
 @pytest.mark.parametrize("width", [0.05, 0.3])
 def test_steps_are_of_second_order(klein, coupling, width, back_force_ratio):

@@ -15,7 +15,7 @@ import netCDF4
 import numpy as np
 import pytest
 import xarray as xr
-from conftest import ROOT, klein_tables
+from conftest import ROOT, klein_tables, long
 from kinds import configuration
 from mesoslip.output import files, filling, targets, writing
 from mesoslip.output.arrays import Arrays
@@ -175,7 +175,7 @@ def test_rows_of_the_kernel_become_variables(results):
             np.testing.assert_array_equal(tree["layer_displacement"].values[place], rows)
 
 
-@pytest.mark.parametrize("rows", [1, 7])
+@pytest.mark.parametrize("rows", [long(1), 7])
 def test_blocks_do_not_matter(results, tmp_path, monkeypatch, rows):
     """Blocks that end anywhere, within and between realizations."""
     tree = build_tree(results)

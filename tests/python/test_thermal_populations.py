@@ -60,7 +60,7 @@ def test_steady_force_is_the_closed_form_to_six_digits(velocity, force):
     ("threshold", "ratio", "velocity"),
     [
         ({"law": "uniform", "relative_width": 0.3}, 0.04, 1e-3),
-        ({"law": "weibull", "relative_width": 0.4}, 0.04, 1e-2),
+        long({"law": "weibull", "relative_width": 0.4}, 0.04, 1e-2),
         ({"law": "exponential", "relative_width": 1.0}, 0.01, 1e-2),
         ({"law": "lognormal", "relative_width": 0.2}, 1.0, 1.0),
         (TABLE, 0.02, 1e-5),
@@ -180,7 +180,7 @@ def test_without_temperature_it_is_the_model_without():
     [
         {},
         {"contacts__delay_law": "exponential"},
-        {"contacts__newborn_width": 0.05},
+        long({"contacts__newborn_width": 0.05}),
         {"contacts__newborn_width": 0.05, "contacts__initial": "steady"},
     ],
 )

@@ -245,9 +245,7 @@ def few_samples():
     """The force curve of some samples of two peaks."""
     law = two_peaks(300, seed=2)
     tables = klein_tables(contacts__threshold=law, curve={"length": 3e-8})
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("mesoslip.theory.force_curve.MAX_SMOOTHED_WORK", 1e7)
-        yield ForceCurve(Config.from_dict(tables))
+    return ForceCurve(Config.from_dict(tables))
 
 
 def test_samples_have_no_derivatives_of_a_density(few_samples):

@@ -64,8 +64,9 @@ module mesoslip_schedule
          & attach_drag(max_events) = 0.0_wp
       !> Displacements of past attachments [m]
       real(wp) :: attach_displacement(max_events) = 0.0_wp
-      !> Strength along the track, which multiplies breaking stretches where contacts attach
-      type(track_strength_type) :: strength
+      !> Strength along the track, which multiplies breaking stretches where contacts attach; not
+      !> allocated where there is none
+      class(track_strength_type), allocatable :: strength
       !> Whether it multiplies first stretches too
       logical :: scales_stretches = .false.
       !> Whether contacts that break may attach within the schedule; for each break the delay until
@@ -113,7 +114,8 @@ module mesoslip_schedule
       procedure, non_overridable :: break_count
       !> Make the events that are due at a time and a displacement
       procedure, non_overridable :: pass
-      procedure, non_overridable, private :: break_due, attach_due, insert_attachment, can_attach
+      procedure, non_overridable, private :: break_due, attach_due, fit_to_track, &
+         & insert_attachment
       procedure, non_overridable, private :: pass_clocks, break_with_clocks, attach_with_clocks, &
          & change_sign, cut_lists, skip_gone
    end type schedule_type
@@ -175,7 +177,10 @@ contains
          end if
          call self%break_due(time, displacement)
       end if
-      if (self%attach_time(self%attached + 1) <= time) call self%attach_due(time, displacement)
+      if (self%attach_time(self%attached + 1) <= time) then
+         if (allocated(self%strength)) call self%fit_to_track(time, displacement)
+         call self%attach_due(time, displacement)
+      end if
       self%is_over = self%broken == self%breaks .or. time >= self%end_time &
          & .or. self%attach_time(self%attached + 1) <= time &
          & .or. abs(displacement) * self%mean_stiffness >= self%max_force
@@ -264,6 +269,22 @@ contains
       self%attachments = self%attachments + 1
    end subroutine insert_attachment
 
+   !> Set the stretches of all contacts that are due by the strength where they attach. The schedule
+   !> ends before one that is too weak there to attach.
+   subroutine fit_to_track(self, time, displacement)
+      class(schedule_type), intent(inout) :: self
+      real(wp), intent(in) :: time, displacement
+
+      integer :: event
+
+      do event = self%attached + 1, self%attachments
+         if (self%attach_time(event) > time) return
+         if (.not. self%strength%lets_attach(displacement, self%scales_stretches, &
+            & self%attach_limit(event), self%attach_stretch(event))) exit
+      end do
+      self%attachments = min(self%attachments, event - 1)
+   end subroutine fit_to_track
+
    !> Attach all contacts that are due. One that would break before listed ones ends the list there.
    subroutine attach_due(self, time, displacement)
       class(schedule_type), intent(inout) :: self
@@ -274,9 +295,6 @@ contains
 
       do event = self%attached + 1, self%attachments
          if (self%attach_time(event) > time) exit
-         if (self%strength%is_used) then
-            if (.not. self%can_attach(event, displacement)) exit
-         end if
          self%attach_displacement(event) = displacement
          origin = displacement - self%attach_stretch(event)
          call self%drag%add(-self%attach_drag(event))
@@ -349,6 +367,7 @@ contains
          & .or. self%pinned == self%others
       if (self%is_over) return
       if (self%attach_time(self%attached + 1) <= time) then
+         if (allocated(self%strength)) call self%fit_to_track(time, displacement)
          call self%attach_with_clocks(time, displacement)
          self%is_over = self%broken == self%breaks .or. self%clock_broken == self%clock_breaks &
             & .or. self%attach_time(self%attached + 1) <= time
@@ -356,26 +375,6 @@ contains
       end if
       self%hazard%next(self%number) = self%clock_key(self%clock_broken + 1)
    end subroutine pass_clocks
-
-   !> Set the stretches of a contact that attaches at a displacement [m] by the strength there;
-   !> false if the contact is too weak there to attach, and has to be drawn again.
-   function can_attach(self, event, displacement)
-      class(schedule_type), intent(inout) :: self
-      integer, intent(in) :: event
-      real(wp), intent(in) :: displacement
-      logical :: can_attach
-
-      real(wp) :: factor, limit, stretch
-
-      factor = self%strength%factor(displacement)
-      limit = factor * self%attach_limit(event)
-      stretch = self%attach_stretch(event)
-      if (self%scales_stretches) stretch = factor * stretch
-      can_attach = abs(stretch) < limit
-      if (.not. can_attach) return
-      self%attach_limit(event) = limit
-      self%attach_stretch(event) = stretch
-   end function can_attach
 
    !> Break a contact.
    subroutine break_with_clocks(self, time, displacement, entry, origin)
@@ -433,9 +432,6 @@ contains
 
       do event = self%attached + 1, self%attachments
          if (self%attach_time(event) > time) exit
-         if (self%strength%is_used) then
-            if (.not. self%can_attach(event, displacement)) exit
-         end if
          self%attach_displacement(event) = displacement
          origin = displacement - self%attach_stretch(event)
          call self%drag%add(-self%attach_drag(event))

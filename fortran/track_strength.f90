@@ -69,6 +69,9 @@ module mesoslip_track_strength
    contains
       !> Factor of the thresholds at a displacement, and g there
       procedure, non_overridable :: factor, relative_strength
+      !> Set the stretches of a contact that attaches. It can be overridden, although nothing does so,
+      !> as the call by the class keeps this rare case out of the innermost loops of sliders.
+      procedure :: lets_attach
       !> Usual maximum of the factor
       procedure, non_overridable :: usual_max
       !> Correlation length [m]
@@ -122,6 +125,29 @@ contains
 
       factor = max(self%floor, 1.0_wp + self%spread * self%relative_strength(displacement))
    end function factor
+
+   !> Set the stretches of a contact that attaches by the strength there; false if the contact is
+   !> too weak there to attach, and has to be drawn again.
+   function lets_attach(self, displacement, scales_stretch, limit, stretch) result(attaches)
+      class(track_strength_type), intent(inout) :: self
+      !> Displacement of the slider from the present origin [m]
+      real(wp), intent(in) :: displacement
+      !> Whether the strength multiplies the first stretch too
+      logical, intent(in) :: scales_stretch
+      !> Stretch at breaking and at first [m], which do not change if it does not attach
+      real(wp), intent(inout) :: limit, stretch
+      logical :: attaches
+
+      real(wp) :: factor, first
+
+      factor = self%factor(displacement)
+      first = stretch
+      if (scales_stretch) first = factor * stretch
+      attaches = abs(first) < factor * limit
+      if (.not. attaches) return
+      limit = factor * limit
+      stretch = first
+   end function lets_attach
 
    !> The Gaussian function g at a displacement.
    function relative_strength(self, displacement) result(strength)

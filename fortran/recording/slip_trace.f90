@@ -103,9 +103,9 @@ contains
          call self%rows%add(sample)
          self%last_time = self%next_time
          self%samples = self%samples + 1
+         self%next_time = self%start_time + real(self%samples, wp) * self%interval
          ! Late in a run the interval may be below the rounding error of the time.
-         self%next_time = max(self%start_time + real(self%samples, wp) * self%interval, &
-            & nearest(self%last_time, 1.0_wp))
+         if (.not. self%next_time > self%last_time) self%next_time = nearest(self%last_time, 1.0_wp)
       end do
    end subroutine take_samples
 

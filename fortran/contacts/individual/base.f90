@@ -420,7 +420,9 @@ contains
       schedule%attached = 0
       schedule%delay = self%parameters%delay
       if (self%parameters%strength%is_used) then
-         if (.not. schedule%strength%is_used) schedule%strength = self%parameters%strength
+         if (.not. allocated(schedule%strength)) then
+            allocate (schedule%strength, source=self%parameters%strength)
+         end if
          schedule%strength%origin = self%parameters%strength%origin
          schedule%scales_stretches = self%parameters%keeps_thresholds
       end if

@@ -24,7 +24,7 @@ module mesoslip_contacts_individual_avalanche_track
       integer :: columns = 0, rows = 0
       !> Number of contacts that broke, each counted once
       integer :: area = 0
-      !> Number of the current generation
+      !> Number of generations that have broken; contacts that break belong to the next one
       integer :: generation = 0
       !> State of the track, shape (track_length, columns rows)
       integer, allocatable :: contact(:, :)
@@ -66,7 +66,7 @@ contains
 
       if (self%columns == 0) return
       if (self%contact(row_generation, contact) > 0) return
-      self%contact(row_generation, contact) = self%generation
+      self%contact(row_generation, contact) = self%generation + 1
       self%area = self%area + 1
       self%contact(row_member, self%area) = contact
    end subroutine add

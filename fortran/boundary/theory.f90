@@ -75,7 +75,9 @@ subroutine force_curve(length, names, values, words, start, width, panels, point
    call make_contact_lives(lives, parameters, error)
    if (.not. allocated(error)) then
       call lives%spread_table(width)
-      call solve_renewal(lives, start, width, panels, points, renewal)
+      call solve_renewal(lives, start, width, panels, points, renewal, error)
+   end if
+   if (.not. allocated(error)) then
       point = renewal%point
       breaks = renewal%breaks
       slope = renewal%slope

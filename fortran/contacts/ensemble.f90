@@ -217,11 +217,11 @@ contains
          end if
       end if
       if (self%queue%first_key > self%direction * displacement) return
-      self%track%generation = self%track%generation + 1
       do while (self%queue%first_key <= self%direction * displacement)
          call self%queue%pop(self%record, contact)
          call self%detach(contact, displacement, time)
       end do
+      self%track%generation = self%track%generation + 1
    end subroutine break_due
 
    subroutine rebuild(self, displacement)

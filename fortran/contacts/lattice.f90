@@ -185,13 +185,13 @@ contains
       do
          call self%list_due(pose, number)
          if (number == 0) return
-         self%track%generation = self%track%generation + 1
          do listed = 1, number
             call self%detach(self%generation(listed), pose%displacement, pose%time)
          end do
          do listed = 1, number
             call self%update_neighbours(self%generation(listed), -1.0_wp)
          end do
+         self%track%generation = self%track%generation + 1
       end do
    end subroutine cascade
 

@@ -92,7 +92,7 @@ contains
       if (allocated(error)) return
       if (ages) call self%pinned%set_ageing(ageing)
       if (is_thermal) call activate(self, rate, force, error)
-      call set_up_load(self)
+      if (.not. allocated(error)) call set_up_load(self, error)
       call move_alloc(self, contacts)
    end subroutine make_contact_populations
 

@@ -7,6 +7,7 @@
 !> the work is proportional to the number of panels.
 module mesoslip_theory_renewal
    use mesoslip_numerics_kinds, only: wp
+   use mesoslip_numerics_errors, only: error_type, raise, status_memory
    use mesoslip_theory_lives, only: contact_lives_type
    use mesoslip_contacts_mechanics, only: coupling_equal
    use mesoslip_numerics_quadrature, only: barycentric_weights, gauss_legendre, &
@@ -15,6 +16,8 @@ module mesoslip_theory_renewal
    private
 
    public :: renewal_solution_type, solve_renewal
+
+   character(len=*), parameter :: no_memory = "not enough memory for the force curve"
 
    !> Breaks, and the force of the contacts, on panels of the displacement.
    type :: renewal_solution_type
@@ -32,27 +35,36 @@ module mesoslip_theory_renewal
 contains
 
    !> Solve the renewal equation.
-   subroutine solve_renewal(lives, start, width, panels, points, solution)
+   subroutine solve_renewal(lives, start, width, panels, points, solution, error)
       type(contact_lives_type), intent(in) :: lives
       !> Start of the first panel, at or below the start of the motion at 0; width of the panels
       real(wp), intent(in) :: start, width
       !> Number of panels, and of points in each
       integer, intent(in) :: panels, points
       type(renewal_solution_type), intent(out) :: solution
+      !> Set if there is not enough memory
+      type(error_type), allocatable, intent(out) :: error
 
       real(wp), allocatable :: kernel(:, :, :, :), released(:, :, :)
       real(wp) :: weight(points), system(points, points), rates(3)
-      integer :: first, last, panel, lag, i, kinds, kind
+      integer :: first, last, panel, lag, i, kinds, kind, stat
 
-      allocate (solution%point(points))
+      allocate (solution%point(points), solution%breaks(points, panels), &
+         & solution%slope(points, panels), solution%force(points, panels), &
+         & solution%stiffness(points, panels), solution%pinned(panels + 1), &
+         & released(points, panels, 3), stat=stat)
+      if (stat /= 0) then
+         call raise(error, status_memory, no_memory)
+         return
+      end if
       call gauss_legendre(solution%point, weight)
       ! Equal contacts lose stiffness as they break.
       kinds = 3
       if (lives%coupling == coupling_equal) kinds = 2
-      call kernel_blocks(lives, width, panels, solution%point, kinds, kernel, first, last)
+      call kernel_blocks(lives, width, panels, solution%point, kinds, kernel, first, last, error)
+      if (allocated(error)) return
 
       ! Rates of breaks, of released force, of lost stiffness.
-      allocate (released(points, panels, 3))
       do panel = 1, panels
          do i = 1, points
             rates = lives%first_rates(start + (panel - 1 + solution%point(i)) * width)
@@ -79,12 +91,12 @@ contains
          if (kinds == 2) released(:, panel, 3) = released(:, panel, 1)
       end do
 
-      call bear(lives, start, width, weight, released, solution)
+      call bear(lives, start, width, weight, released, solution, error)
       solution%breaks = released(:, :, 1)
    end subroutine solve_renewal
 
    !> Integrals of the kernels over the Lagrange polynomials of earlier panels, by their lag.
-   subroutine kernel_blocks(lives, width, panels, point, kinds, kernel, first, last)
+   subroutine kernel_blocks(lives, width, panels, point, kinds, kernel, first, last, error)
       type(contact_lives_type), intent(in) :: lives
       real(wp), intent(in) :: width
       integer, intent(in) :: panels
@@ -96,17 +108,22 @@ contains
       real(wp), allocatable, intent(out) :: kernel(:, :, :, :)
       !> Lags of the first block and the last
       integer, intent(out) :: first, last
+      !> Set if there is not enough memory
+      type(error_type), allocatable, intent(out) :: error
 
       real(wp) :: node(2 * size(point)), weight(2 * size(point)), barycentric(size(point))
       real(wp) :: edge(4), rates(3), basis(size(point)), length, t
-      integer :: lag, i, j, piece, kind
+      integer :: lag, i, j, piece, kind, stat
 
       first = max(0, int(lives%shortest / width) - 1)
       last = min(panels - 1, int(lives%longest / width) + 2)
       call gauss_legendre(node, weight)
       barycentric = barycentric_weights(point)
-      allocate (kernel(size(point), size(point), kinds, first:last))
-      kernel = 0.0_wp
+      allocate (kernel(size(point), size(point), kinds, first:last), source=0.0_wp, stat=stat)
+      if (stat /= 0) then
+         call raise(error, status_memory, no_memory)
+         return
+      end if
       do lag = first, last
          do i = 1, size(point)
             ! The kernel at (lag + point - t) width is not smooth at the ends of the lives.
@@ -133,7 +150,7 @@ contains
    end subroutine kernel_blocks
 
    !> Force on the contacts: at the edges of panels from all that attached, between by rates.
-   subroutine bear(lives, start, width, weight, released, solution)
+   subroutine bear(lives, start, width, weight, released, solution, error)
       type(contact_lives_type), intent(in) :: lives
       real(wp), intent(in) :: start, width
       !> Weights of the points of a panel, shape (points)
@@ -141,10 +158,12 @@ contains
       !> Rates of breaks, of released force and of lost stiffness, shape (points, panels, 3)
       real(wp), intent(in) :: released(:, :, :)
       type(renewal_solution_type), intent(inout) :: solution
+      !> Set if there is not enough memory
+      type(error_type), allocatable, intent(out) :: error
 
       real(wp) :: matrix(size(weight), size(weight)), state(3), whole, age
       real(wp), allocatable :: left(:, :, :)
-      integer :: points, panels, panel, lag, lags, young, i
+      integer :: points, panels, panel, lag, lags, young, i, stat
 
       points = size(released, 1)
       panels = size(released, 2)
@@ -152,7 +171,11 @@ contains
       lags = min(panels, int(lives%longest / width) + 2)
       ! Contacts that attached in the last young panels are all pinned.
       young = min(lags, int(lives%shortest / width))
-      allocate (left(points, 3, young + 1:lags))
+      allocate (left(points, 3, young + 1:lags), stat=stat)
+      if (stat /= 0) then
+         call raise(error, status_memory, no_memory)
+         return
+      end if
       do lag = young + 1, lags
          do i = 1, points
             left(i, :, lag) = width * weight(i) &
@@ -160,8 +183,6 @@ contains
          end do
       end do
 
-      allocate (solution%slope(points, panels), solution%force(points, panels))
-      allocate (solution%stiffness(points, panels), solution%pinned(panels + 1))
       ! Number of these contacts, and sum of their ages.
       whole = 0.0_wp
       age = 0.0_wp

@@ -11,9 +11,21 @@ from contextlib import contextmanager
 ARRAY_PACKAGES = ("dask", "pint", "cupy", "sparse")
 
 
+# "xarray" once it was imported while the packages were hidden.
+_imported_hidden: set[str] = set()
+
+
 @contextmanager
 def hidden() -> Iterator[None]:
-    """Hide the packages that are not imported yet, as if they were not installed."""
+    """Hide the packages that are not imported yet, as if they were not installed.
+
+    Where another program has imported xarray before, it may count on them: nothing is hidden.
+    """
+    if "xarray" not in sys.modules:
+        _imported_hidden.add("xarray")
+    elif "xarray" not in _imported_hidden:
+        yield
+        return
     absent = [name for name in ARRAY_PACKAGES if name not in sys.modules]
     # An entry of None makes an import fail.
     sys.modules.update(dict.fromkeys(absent))  # type: ignore[arg-type]

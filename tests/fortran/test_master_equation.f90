@@ -125,7 +125,8 @@ contains
       call parameters%add_word("initial", "relaxed")
       call make_contact_lives(lives, parameters, error)
       call check(.not. allocated(error), "exponential lives")
-      call solve_renewal(lives, 0.0_wp, 0.25_wp, 80, 10, solution)
+      call solve_renewal(lives, 0.0_wp, 0.25_wp, 80, 10, solution, error)
+      call check(.not. allocated(error), "memory for the renewal equation")
       call check_close(maxval(abs(solution%breaks - 1.0_wp)), 0.0_wp, 1.0e-12_wp, "Poisson process")
       call check_close(maxval(abs(solution%pinned - 1.0_wp)), 0.0_wp, 1.0e-12_wp, "conservation")
       ! The force of a contact is its age, whose mean is 1 - exp(-X).

@@ -27,10 +27,11 @@ os.environ["MPLBACKEND"] = "agg"
 import attacks  # noqa: E402
 import files  # noqa: E402
 import limits  # noqa: E402
+import resources  # noqa: E402
 from apart import Apart, result_of, wait_for_any  # noqa: E402
 from attacks import Report, check_configuration, prepare  # noqa: E402
 
-ATTACKS = attacks.ATTACKS | files.ATTACKS | limits.ATTACKS
+ATTACKS = attacks.ATTACKS | files.ATTACKS | limits.ATTACKS | resources.ATTACKS
 
 # Time that a case has [s]; what is interrupted in it takes less.
 CASE_SECONDS = 120.0
@@ -43,7 +44,7 @@ SMALLEST_SECONDS = 20.0
 MOST_SMALLEST = 2
 
 # Attacks that start from outputs which are made before.
-NEED_OUTPUTS = {"outputs", "signals", "disks", "terminals", "links"}
+NEED_OUTPUTS = {"outputs", "signals", "disks", "terminals", "links", "movies"}
 
 NUMBER = re.compile(rb"(?<== )-?[0-9.]+(e-?[0-9]+)?$")
 

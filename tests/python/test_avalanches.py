@@ -10,6 +10,7 @@ import mesoslip
 import numpy as np
 import pytest
 from conftest import klein_tables
+from kinds import FAST, PLACES, THERMAL
 from mesoslip import Config
 from mesoslip.analysis.avalanche_sizes import EXPONENTIAL_CUTOFF, fit_power_law
 from mesoslip.analysis.avalanches import failures
@@ -225,6 +226,22 @@ def test_small_avalanches_may_be_left_out():
     sizes = everything["avalanches"]["size"].values
     np.testing.assert_array_equal(large["avalanches"]["size"].values, sizes[sizes >= 20])
     assert large["avalanche_count"].item() == 2000
+
+
+@pytest.mark.parametrize(
+    "contacts", [{}, THERMAL | {"contacts__thermal": {"rate": 1.0, "force_ratio": 0.01}}]
+)
+def test_each_contact_counts_once_in_an_area(contacts):
+    """Contacts of the first generation of an avalanche break again in it."""
+    changes = FAST | contacts | {"interaction": PLACES | {"strength": 0.0}}
+    changes |= {"slider": {"kind": "quasistatic", "stiffness": 20.0}, "drive": {"velocity": 1e-5}}
+    tree = mesoslip.run(klein_tables(**changes | {"run__duration": 0.2}))
+    area, size, generations = (
+        tree["avalanches"][name].values for name in ("area", "size", "generations")
+    )
+    assert (size > area).any()
+    assert np.all((area >= 1) & (area <= np.minimum(size, PLACES["columns"] * PLACES["rows"])))
+    assert np.all((generations >= 1) & (generations <= size))
 
 
 def test_stick_slip_by_interaction(klein):

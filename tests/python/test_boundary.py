@@ -16,9 +16,10 @@ from mesoslip.configuration.contacts import tables as contacts
 from mesoslip.configuration.sliders.layered import SOLVERS
 from mesoslip.configuration.threshold_laws import LAWS
 from mesoslip.errors import RunError
+from mesoslip.memory_limit import RESERVE
 from mesoslip.output import variables
 from mesoslip.simulation import recorded_tables as tables
-from mesoslip.simulation.kernel import RESERVE, Kernel, name_list
+from mesoslip.simulation.kernel import Kernel, name_list
 from mesoslip.simulation.kernel_setup import KernelSetup
 from mesoslip.simulation.realization import ENDINGS
 from mesoslip.theory.lives import Scales

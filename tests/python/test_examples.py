@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import subprocess
+import sys
 from importlib.metadata import files
 
 import mesoslip
@@ -120,3 +121,30 @@ def test_a_missing_library_is_reported_in_a_line(problem, message, monkeypatch, 
     assert status == 1
     assert message in errors
     assert errors.count("\n") == 1
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems do not limit the address space")
+@pytest.mark.parametrize("megabytes", [100, 260])
+def test_libraries_without_memory_are_no_crash(megabytes):
+    """Which would wait for it without end, or crash."""
+    line = f'ulimit -v {1024 * megabytes}; exec "$@"'
+    command = [sys.executable, "-m", "mesoslip", "curve", str(ROOT / "runs" / "klein.toml")]
+    result = subprocess.run(
+        ["bash", "-c", line, "bash", *command], capture_output=True, text=True, check=False
+    )
+    assert result.returncode == 1, result.stderr
+    assert result.stderr == "mesoslip: there is not enough memory for this\n"
+
+
+def test_xarray_that_was_imported_before_keeps_its_packages():
+    """It counts on Dask once it has seen that there is one."""
+    code = """
+import sys, xarray
+from xarray.namedarray.utils import module_available
+from mesoslip.array_packages import hidden
+module_available("dask")
+with hidden():
+    assert "dask" not in sys.modules or sys.modules["dask"] is not None
+    xarray.Dataset({"a": ("x", [1.0])}).load()
+"""
+    subprocess.run([sys.executable, "-c", code], check=True)

@@ -74,6 +74,8 @@ def test_the_same_slips_however_they_are_written(tmp_path, laboratory):
     assert np.median(slips["waiting_time"][1:]) * laboratory.rate == pytest.approx(1, rel=0.01)
     found = mesoslip.regime(tree)
     assert found["regime"] == STICK_SLIP
+    # No static force is known.
+    assert found["relative_amplitude"].attrs["long_name"].endswith("over the maximum force")
     assert found["period"] * laboratory.rate == pytest.approx(1, rel=0.01)
     # Impulses would be 15 mm/s in one to two samples of a hundred; those in slips remain.
     speed = laboratory.sign * tree["velocity"].values[0] / laboratory.rate
@@ -97,6 +99,10 @@ def test_commands_from_the_file_to_the_page(tmp_path, command, monkeypatch, name
     write(tmp_path / "teeth.csv", laboratory)
     options = ["--velocity", "100 um/s", "--stiffness", laboratory.stiffness]
     assert command("trace", "teeth.csv", *options)[0] == 0
+    status, printed, _ = command("regime", "out/teeth.nc")
+    assert status == 0
+    assert "% of the maximum force" in printed
+    assert "static force" not in printed
     status, printed, _ = command("slips", "out/teeth.nc")
     assert status == 0
     heads = printed.splitlines()[0]

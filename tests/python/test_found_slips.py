@@ -228,12 +228,15 @@ def test_creep_begins_after_the_rebound(delay, damping_ratio):
     share = found["creep_share"].values[1:]
     assert share.size >= 2
     in_slips = mesoslip.response(tree, fit=False)["steady/slip_share"].item()
+    in_window = mesoslip.regime(tree)["slip_share"].item()
     if damping_ratio < 0.1:
         assert np.isnan(share).all()
         assert math.isnan(in_slips)
+        assert math.isnan(in_window)
     else:
         # Drops with their rebounds add up to 1.5 of the loading; the rest is that of creep.
         assert in_slips == pytest.approx(1 - np.median(share), abs=0.1)
+        assert in_window == pytest.approx(in_slips, abs=0.1)
         # Pinned contacts stretch by K/(K + Nk) of the drive; only some break before a slip.
         assert np.all(share > 0.8 * 97 / 2097)
         assert np.median(share) < 0.15

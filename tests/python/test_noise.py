@@ -104,6 +104,14 @@ def test_drift():
     assert noise.drift == pytest.approx(0.02, rel=0.1)
 
 
+@pytest.mark.parametrize(("sign", "drift"), [(1, 0.0), (-1, 0.0), (1, 0.02)])
+def test_a_first_loading_is_no_drift(sign, drift):
+    """A trace that starts relaxed: half of it is loading."""
+    loading = np.minimum(TIME / TIME[-1] * 2, 1.0) * 5.0
+    noise = estimate_noise(TIME, sign * (loading + SAW) + white() + drift * TIME)
+    assert noise.drift == pytest.approx(drift, rel=0.25)
+
+
 @pytest.mark.parametrize("samples", [4.0, 15.0])
 def test_correlated_noise_beside_white_noise(samples):
     noise = estimate_noise(TIME, SAW + white() + coloured(0.01, samples))

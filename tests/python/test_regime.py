@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import importlib.util
 import json
+import math
 import sys
 
 import mesoslip
@@ -141,7 +142,9 @@ def ringing(periods, decay):
         since = np.maximum(TIME - start, 0.0)
         swing = np.exp(-decay * since) * np.cos(2 * np.pi * 200 * since)
         force = force - np.where(TIME > start, size * (1 - 0.9 * swing), 0.0)
-    return force + 1e-6, Slips(starts, np.interp(starts, TIME, force), 1.8 * drop)
+    force += 1e-6
+    before = force[np.searchsorted(TIME, starts, "right") - 1]
+    return force, Slips(starts, starts + 2.5e-3, before, 1.8 * drop)
 
 
 def test_ringing_after_slips_is_no_cycle(klein):
@@ -156,13 +159,16 @@ def test_ringing_after_slips_is_no_cycle(klein):
     assert (found.regime, found.are_slips, found.cycles) == (STICK_SLIP, True, 24)
     assert found.period == pytest.approx(0.0375, rel=0.05)
     assert found.slips == 25
-    assert found.slip_share == pytest.approx(1.8, rel=0.1)
+    # The slider swings too much for a rest; where it does rest, the rebound is left out.
+    assert math.isnan(found.slip_share)
+    force, slips = ringing(periods, 400.0)
+    assert result(config, force, slips=slips).slip_share == pytest.approx(1, rel=0.08)
     assert "a slip every 3" in found.summary
 
 
 def test_oscillations_with_one_slip_have_cycles_of_the_force(klein):
     force = 1e-5 + 3e-6 * np.sin(2 * np.pi * 100 * TIME)
-    found = result(klein(), force, slips=Slips(*np.array([[0.5], [1.3e-5], [6e-6]])))
+    found = result(klein(), force, slips=Slips(*np.array([[0.5], [0.51], [1.3e-5], [6e-6]])))
     assert (found.regime, found.are_slips, found.slips) == (STICK_SLIP, False, 1)
     assert found.cycles == 99
     assert "99 oscillations of 10" in found.summary
@@ -180,7 +186,7 @@ def test_peaks_that_vary_are_irregular(klein):
         (1 + 0.1 * rng.normal(size=60), even, STICK_SLIP),
     ]:
         starts = np.cumsum(periods) / 62
-        slips = Slips(starts, 1.5e-5 * peaks, np.full(60, 1.5e-5))
+        slips = Slips(starts, starts, 1.5e-5 * peaks, np.full(60, 1.5e-5))
         force = sawtooth(np.full(60, 1 / 62), np.full(60, 0.8))
         found = result(klein(), force, slips=slips)
         assert (found.regime, found.are_slips) == (regime, True)
@@ -277,6 +283,9 @@ def test_kinds_of_runs(klein):
     few = {"contacts__count": 500, "output__interval": 1e-3}
     assert regime_of(klein(**few, run__duration=1.0)) == [TRANSIENT]
     assert regime_of(klein(**few, slider={"kind": "prescribed"}, run__duration=3.0)) == [SMOOTH]
+    # The drive of a rigid spring that holds loads nothing.
+    hold = klein(contacts__count=10, slider={"kind": "prescribed"}, drive={"velocity": 0.0})
+    assert regime_of(hold.replace({"run.duration": 0.1})) == [TRANSIENT]
     smooth = klein(**few, slider__stiffness=200.0, contacts__delay=3e-4, run__realizations=3)
     assert regime_of(smooth) == [SMOOTH] * 3
     layers = {"kind": "layered", "mass": 1.47e-3, "stiffness": 97.0, "layers": 4}

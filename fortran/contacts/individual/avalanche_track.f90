@@ -24,7 +24,7 @@ module mesoslip_contacts_individual_avalanche_track
       integer :: columns = 0, rows = 0
       !> Number of contacts that broke, each counted once
       integer :: area = 0
-      !> Number of the current generation
+      !> Number of generations that have broken; contacts that break belong to the next one
       integer :: generation = 0
       !> State of the track, shape (track_length, columns rows)
       integer, allocatable :: contact(:, :)
@@ -66,7 +66,7 @@ contains
 
       if (self%columns == 0) return
       if (self%contact(row_generation, contact) > 0) return
-      self%contact(row_generation, contact) = self%generation
+      self%contact(row_generation, contact) = self%generation + 1
       self%area = self%area + 1
       self%contact(row_member, self%area) = contact
    end subroutine add
@@ -80,39 +80,39 @@ contains
       width = min(self%area, 1)
       height = width
       if (self%area < 2) return
-      associate (member => self%contact(row_member, :self%area) - 1)
-         width = arc(modulo(member, self%columns), self%columns)
-         height = arc(member / self%columns, self%rows)
-      end associate
+      width = arc(self, self%columns, 1)
+      height = arc(self, self%rows, self%columns)
    end subroutine extent
 
-   !> Length of the shortest arc of a circle of sites that contains some of them.
-   pure function arc(site, length)
-      !> The sites, numbered from 0, and the length of the circle
-      integer, intent(in) :: site(:), length
+   !> Length of the shortest arc of a circle of columns or rows that contains those of an avalanche.
+   pure function arc(self, length, stride)
+      type(avalanche_track_type), intent(in) :: self
+      !> Length of the circle, and distance of its sites in the numbers of contacts
+      integer, intent(in) :: length, stride
       integer :: arc
 
-      logical, allocatable :: marked(:)
-      integer :: sorted(few), number, position, gap, previous, first
+      logical :: marked(0:length - 1)
+      integer :: sorted(few), number, position, gap, previous, first, site
 
       gap = 0
-      if (size(site) <= few) then
-         do number = 1, size(site)
+      marked = .false.
+      if (self%area <= few) then
+         do number = 1, self%area
+            site = modulo((self%contact(row_member, number) - 1) / stride, length)
             do position = number, 2, -1
-               if (sorted(position - 1) <= site(number)) exit
+               if (sorted(position - 1) <= site) exit
                sorted(position) = sorted(position - 1)
             end do
-            sorted(position) = site(number)
+            sorted(position) = site
          end do
-         previous = sorted(size(site)) - length
-         do number = 1, size(site)
+         previous = sorted(self%area) - length
+         do number = 1, self%area
             gap = max(gap, sorted(number) - previous - 1)
             previous = sorted(number)
          end do
       else
-         allocate (marked(0:length - 1), source=.false.)
-         do number = 1, size(site)
-            marked(site(number)) = .true.
+         do number = 1, self%area
+            marked(modulo((self%contact(row_member, number) - 1) / stride, length)) = .true.
          end do
          first = findloc(marked, .true., dim=1) - 1
          previous = first

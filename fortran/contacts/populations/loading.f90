@@ -9,6 +9,7 @@ module mesoslip_contacts_populations_loading
    use mesoslip_contacts_populations_motion, only: position_at
    use mesoslip_contacts_populations_state, only: population_state_type
    use mesoslip_interface_law, only: interface_law_type, pose_type
+   use mesoslip_numerics_errors, only: error_type, raise, status_memory
    use mesoslip_numerics_kinds, only: wp
    implicit none
    private
@@ -24,15 +25,24 @@ module mesoslip_contacts_populations_loading
 contains
 
    !> Set up the bins of heights.
-   subroutine set_up_load(self)
+   subroutine set_up_load(self, error)
       class(population_state_type), intent(inout) :: self
+      !> Set if there is not enough memory
+      type(error_type), allocatable, intent(inout) :: error
+
+      integer :: stat
 
       if (.not. self%parameters%load%changes) return
       self%edge = self%parameters%load%edges(max_share * self%resolution)
       self%share = self%edge(size(self%edge))
-      allocate (self%pinned%mix(self%bins(), size(self%pinned%population, 1)), source=0.0_wp)
+      allocate (self%pinned%mix(self%bins(), size(self%pinned%population, 1)), source=0.0_wp, &
+         & stat=stat)
+      if (stat /= 0) then
+         call raise(error, status_memory, "not enough memory for the heights of contacts")
+         return
+      end if
       self%pinned%newborn_mix = bin_parts(self, 0.0_wp, self%share)
-      call self%detached%set_bins(self%bins())
+      call self%detached%set_bins(self%bins(), error)
    end subroutine set_up_load
 
    !> Reduce the contacts of the start to those in contact.

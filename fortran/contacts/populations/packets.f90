@@ -88,12 +88,19 @@ contains
    end subroutine new_detached_packets
 
    !> Keep contacts by the heights of their sites, in a number of bins.
-   subroutine set_bins(self, bins)
+   subroutine set_bins(self, bins, error)
       class(detached_packets_type), intent(inout) :: self
       integer, intent(in) :: bins
+      !> Set if there is not enough memory
+      type(error_type), allocatable, intent(inout) :: error
+
+      integer :: stat
 
       allocate (self%held(bins), self%pending_held(bins), self%fresh_held(bins), &
-         & self%mix(bins, size(self%packet, 2)), source=0.0_wp)
+         & self%mix(bins, size(self%packet, 2)), source=0.0_wp, stat=stat)
+      if (stat /= 0) then
+         call raise(error, status_memory, "not enough memory for the detached contacts")
+      end if
    end subroutine set_bins
 
    !> Add contacts that broke evenly from one time to another [s], and their mass.
@@ -166,7 +173,7 @@ contains
       type(error_type), allocatable, intent(inout) :: error
 
       real(wp), allocatable :: larger(:, :), mix(:, :)
-      integer :: waiting, stat
+      integer :: waiting, index, stat
 
       waiting = self%last - self%first + 1
       if (2 * waiting > size(self%packet, 2)) then
@@ -185,8 +192,11 @@ contains
             call move_alloc(mix, self%mix)
          end if
       else
-         self%packet(:, :waiting) = self%packet(:, self%first:self%last)
-         if (allocated(self%mix)) self%mix(:, :waiting) = self%mix(:, self%first:self%last)
+         ! Assignments of whole parts would be copied first.
+         do index = 1, waiting
+            self%packet(:, index) = self%packet(:, self%first - 1 + index)
+            if (allocated(self%mix)) self%mix(:, index) = self%mix(:, self%first - 1 + index)
+         end do
       end if
       self%first = 1
       self%last = waiting

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from mesoslip.analysis.apparatus import apparatus_of
 from mesoslip.analysis.steady_force import SteadyMean, steady_mean
-from mesoslip.analysis.stick_phases import stick_phases
+from mesoslip.analysis.stick_phases import relieved_loading
 from mesoslip.configuration.drive import DrivePart
 from mesoslip.errors import FileError
 from mesoslip.output.access import group_of, is_measured
@@ -321,14 +321,12 @@ class Experiment:
             return 0.0
         fallen = loaded = 0.0
         for owner in np.unique(owners):
-            start, end, before = (
+            columns = (
                 data[name][owners == owner] for name in ("start_time", "end_time", "force_before")
             )
-            phases = stick_phases(self.time, self.force[owner], start, end, before)
-            falls = stage.direction * (before[:-1] - phases.rest_force[1:])
-            rests = np.isfinite(falls)
-            fallen += float(falls[rests].sum())
-            loaded += self.stiffness * abs(stage.velocity) * float(np.diff(start)[rests].sum())
+            fall, time = relieved_loading(self.time, self.force[owner], *columns)
+            fallen += stage.direction * fall
+            loaded += self.stiffness * abs(stage.velocity) * time
         return fallen / loaded if loaded > 0 else math.nan
 
     def is_stick_slip(self, stage: Stage) -> bool:

@@ -97,6 +97,20 @@ def stick_phases(
     return StickPhases(duration, rate, measured, creep * np.sign(driven), creep / driven, rest)
 
 
+def relieved_loading(
+    time: Array, force: Array, start_time: Array, end_time: Array, force_before: Array
+) -> tuple[float, float]:
+    """Sum of the falls of slips without their rebounds [N], and time of the loading [s].
+
+    The time is from the start of each slip to that of the next. Slips after which the slider does
+    not rest are left out of both.
+    """
+    phases = stick_phases(time, force, start_time, end_time, force_before)
+    falls = force_before[:-1] - phases.rest_force[1:]
+    rests = np.isfinite(falls)
+    return float(falls[rests].sum()), float(np.diff(start_time)[rests].sum())
+
+
 def _is_one_way(drive: Array) -> bool:
     """Whether the drive does not turn, but for noise."""
     path = float(np.abs(np.diff(drive[:: max(1, len(drive) // 50)])).sum())

@@ -181,7 +181,7 @@ def regime(output: OutputArgument, as_json: JsonOption = False) -> None:
             if name == "regime" or name.endswith("_error"):
                 continue
             error = getattr(one, f"{name}_error", None)
-            show(name, one.row[name], meaning.units, meaning.long_name, error)
+            show(name, one.row[name], meaning.units, one.long_name(name), error)
         typer.echo(one.summary)
     if len(results) > 1:
         typer.echo(summary(results))

@@ -11,6 +11,7 @@ import sys
 import warnings
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
+from mmap import mmap
 from typing import Annotated, Any
 
 import typer
@@ -35,6 +36,7 @@ from mesoslip.command_line import (
     trace,
 )
 from mesoslip.errors import MesoslipError
+from mesoslip.memory_limit import RESERVE, is_memory_short, spare_memory
 from mesoslip.output.provenance import COMMAND_LINE
 
 COMMANDS = (
@@ -79,6 +81,8 @@ WITHOUT_XARRAY = {
 # How to install the libraries that the kernels are linked to.
 LIBRARIES = "Debian, Ubuntu: apt-get install gfortran libsundials-dev"
 NO_MEMORY = "mesoslip: there is not enough memory for this"
+# Memory that every command takes at least [bytes], with the libraries that it imports.
+NEEDED = 2**28
 # How the system says that there is no memory for a library.
 NOT_MAPPED = ("failed to map segment", "annot allocate memory")
 
@@ -141,6 +145,10 @@ def _asked(arguments: Sequence[str]) -> typer.Typer:
 def main() -> None:
     """Run the command line and exit."""
     _open_streams()
+    if is_memory_short(NEEDED):
+        typer.echo(NO_MEMORY, err=True)
+        sys.exit(1)
+    spare = spare_memory()
     # A character that no font has is drawn as a box.
     warnings.filterwarnings("ignore", r"Glyph \d+ .*missing from", UserWarning)
     typed = shlex.join(["mesoslip", *sys.argv[1:]])
@@ -157,22 +165,24 @@ def main() -> None:
     except KeyboardInterrupt:
         status = run.INTERRUPTED
     except ImportError as error:
-        if any(one in str(error) for one in NOT_MAPPED):
-            typer.echo(NO_MEMORY, err=True)
-            sys.exit(1)
         # The kernels lack a shared library; other missing modules are bugs.
-        if "shared object" not in str(error) and "Library not loaded" not in str(error):
+        if any(one in str(error) for one in NOT_MAPPED) or is_memory_short(RESERVE):
+            status = _without_memory(spare)
+        elif "shared object" in str(error) or "Library not loaded" in str(error):
+            typer.echo(f"mesoslip: a library is missing: {error}; {LIBRARIES}", err=True)
+            status = 1
+        else:
             raise
-        typer.echo(f"mesoslip: a library is missing: {error}; {LIBRARIES}", err=True)
-        status = 1
     except MemoryError:
-        typer.echo(NO_MEMORY, err=True)
-        status = 1
+        status = _without_memory(spare)
     except OSError as error:
-        if error.errno == errno.ENOMEM:
-            typer.echo(NO_MEMORY, err=True)
-            sys.exit(1)
-        status = _output_failed(error)
+        is_memory = error.errno == errno.ENOMEM
+        status = _without_memory(spare) if is_memory else _output_failed(error)
+    except Exception:
+        # Libraries that are imported without enough memory fail in ways of their own.
+        if not is_memory_short(RESERVE):
+            raise
+        status = _without_memory(spare)
     finally:
         COMMAND_LINE.reset(token)
     try:
@@ -191,6 +201,14 @@ def _open_streams() -> None:
             setattr(sys, name, os.fdopen(number, "w" if number else "r", closefd=False))
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")
+
+
+def _without_memory(spare: mmap | None) -> int:
+    """Report that there is no memory; what was kept for it is left to destructors."""
+    if spare is not None:
+        spare.close()
+    typer.echo(NO_MEMORY, err=True)
+    return 1
 
 
 def _output_failed(error: OSError) -> int:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import mmap
-import resource
 import threading
 import weakref
 from collections.abc import Mapping
@@ -15,15 +13,13 @@ from numpy.typing import NDArray
 from mesoslip import _core
 from mesoslip.configuration.kernel_parameters import Named, Parameters, named
 from mesoslip.errors import RunError
+from mesoslip.memory_limit import RESERVE, is_memory_short
 
 Array = NDArray[np.float64]
 Words = NDArray[np.int64]
 
 # Maximum number of names in a list.
 MAX_NAMES = 64
-# Memory that must be free before a kernel is called that needs some [bytes], where the memory of
-# the process is limited: Fortran's own library ends the program if a small allocation fails.
-RESERVE = 2**24
 
 
 class Progress(NamedTuple):
@@ -58,12 +54,8 @@ def checked(results: Any) -> tuple[Any, ...]:
 
 def check_reserve() -> None:
     """Raise a `RunError` if there is hardly any memory."""
-    if resource.getrlimit(resource.RLIMIT_AS)[0] == resource.RLIM_INFINITY:
-        return
-    try:
-        mmap.mmap(-1, RESERVE).close()
-    except OSError:
-        raise RunError("there is not enough memory for a simulation") from None
+    if is_memory_short(RESERVE):
+        raise RunError("there is not enough memory for a simulation")
 
 
 class Kernel:

@@ -24,6 +24,9 @@ Array = NDArray[np.float64]
 # Blocks of the trace for the drift, and its minimum size in standard errors.
 DRIFT_BLOCKS = 20
 MIN_DRIFT = 4.0
+# Maximum force at the start of a trace that begins with a first loading, over that of its second
+# half.
+RELAXED = 0.5
 # Points from which the error of a sum over correlated noise is computed.
 MAX_POINTS = 400
 # Share of the samples from which on impulses are reported to be many.
@@ -217,7 +220,12 @@ def estimate_noise(time: Array, force: Array, *, hum: float | None = None) -> Tr
 
 
 def _drift(time: Array, force: Array) -> float:
-    """Slope through medians of blocks, by the median of slopes, if it is significant."""
+    """Slope through medians of blocks, by the median of slopes, if it is significant.
+
+    The first loading of a trace that starts relaxed is left out.
+    """
+    start = _end_of_loading(force)
+    time, force = time[start:], force[start:]
     if len(time) < 4 * DRIFT_BLOCKS:
         return 0.0
     edges = np.searchsorted(time, np.linspace(time[0], time[-1], DRIFT_BLOCKS + 1)[1:-1])
@@ -233,3 +241,14 @@ def _drift(time: Array, force: Array) -> float:
     scatter = float(np.median(np.abs(rest - np.median(rest)))) / NORMAL_MEDIAN
     error = scatter / (math.sqrt(len(at)) * float(np.std(at)))
     return slope if abs(slope) > MIN_DRIFT * error else 0.0
+
+
+def _end_of_loading(force: Array) -> int:
+    """First sample at the level of the second half; 0 where a trace starts at that level."""
+    if not len(force):
+        return 0
+    level = float(np.median(force[len(force) // 2 :]))
+    first = float(np.median(force[: 1 + len(force) // (2 * DRIFT_BLOCKS)]))
+    if not first * np.sign(level) < RELAXED * abs(level):
+        return 0
+    return int(np.argmax(force * np.sign(level) >= abs(level)))

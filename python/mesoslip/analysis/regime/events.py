@@ -41,9 +41,11 @@ class Cycles:
 
 @dataclass(frozen=True)
 class Slips:
-    """Starts of the slips of a realization [s], forces there, and drops, shape (slips,)."""
+    """Starts and ends of the slips of a realization [s], forces at the starts, and drops with
+    their rebounds; shape (slips,)."""
 
     start: Array
+    end: Array
     before: Array
     drop: Array
 
@@ -53,7 +55,12 @@ class Slips:
     def between(self, first: float, last: float, direction: float) -> Slips:
         """Those that start in an interval of time [s], with forces along the drive."""
         inside = (self.start >= first) & (self.start <= last)
-        return Slips(self.start[inside], direction * self.before[inside], np.abs(self.drop[inside]))
+        return self.of(inside, direction)
+
+    def of(self, kept: NDArray[np.bool_], direction: float = 1.0) -> Slips:
+        """Some of them, with forces along a direction."""
+        before, drop = direction * self.before[kept], np.abs(self.drop[kept])
+        return Slips(self.start[kept], self.end[kept], before, drop)
 
     @property
     def large(self) -> Slips:
@@ -62,8 +69,7 @@ class Slips:
             return self
         drops = np.sort(self.drop)
         typical = drops[np.searchsorted(np.cumsum(drops), 0.5 * drops.sum())]
-        kept = self.drop >= MIN_DROP * typical
-        return Slips(self.start[kept], self.before[kept], self.drop[kept])
+        return self.of(self.drop >= MIN_DROP * typical)
 
     @property
     def as_cycles(self) -> Cycles:
@@ -71,7 +77,7 @@ class Slips:
         return Cycles(np.diff(self.start), self.drop, self.before)
 
 
-NO_SLIPS = Slips(np.empty(0), np.empty(0), np.empty(0))
+NO_SLIPS = Slips(*np.empty((4, 0)))
 
 
 def events_of(slips: Slips, cycles: Cycles, loading: float) -> tuple[Cycles, bool]:

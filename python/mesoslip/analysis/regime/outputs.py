@@ -31,6 +31,8 @@ Array = NDArray[np.float64]
 
 # Maximum number of evaluated samples; longer traces are thinned out.
 MAX_SAMPLES = 400_000
+# Columns of the slips of an output.
+SLIP_NAMES = ("start_time", "end_time", "force_before", "force_drop")
 
 
 def regimes(tree: xr.DataTree, name: str = "the output") -> xr.Dataset:
@@ -50,8 +52,12 @@ def regimes(tree: xr.DataTree, name: str = "the output") -> xr.Dataset:
         )
         for name, meaning in REGIME.items()
     }
+    for name, variable in variables.items():
+        variable.attrs["long_name"] = results[0].long_name(name)
     variables["regime"].attrs["flag_values"] = np.arange(len(NAMES), dtype=np.int8)
-    attributes = {} if motion is None else {"motion": motion}
+    attributes = {"force_scale": results[0].force_scale}
+    if motion is not None:
+        attributes["motion"] = motion
     return xr.Dataset(variables, {"realization": tree["realization"]}, attributes)
 
 
@@ -63,7 +69,7 @@ def judge(tree: Tree, name: str = "the output") -> tuple[list[RegimeResult], str
     results = []
     for number in range(root.sizes["realization"]):
         mine = owner == number
-        own = Slips(slips.start[mine], slips.before[mine], slips.drop[mine])
+        own = slips.of(mine)
         pieces = output_pieces(tree, number)[0] if is_measured(tree) else None
         if pieces is None:
             results.append(classify(*_window(tree, number, apparatus), own))
@@ -85,7 +91,7 @@ def _slips(tree: Tree) -> tuple[Array, Slips]:
     if "slips" not in tree.children:
         return np.empty(0), NO_SLIPS
     data = group_of(tree, "slips")
-    columns = (data[name].values for name in ("start_time", "force_before", "force_drop"))
+    columns = (data[name].values for name in SLIP_NAMES)
     return data["realization_index"].values, Slips(*columns)
 
 
@@ -139,7 +145,8 @@ def _in_strokes(
     at = np.searchsorted(time[samples], slips.start)
     kept = np.isin(slips.start, time[samples])
     sign = sliding.sign[inside][at[kept]]
-    own = Slips(glued[at[kept]], sign * slips.before[kept], slips.drop[kept])
+    ends = np.searchsorted(time[samples], slips.end[kept]).clip(max=glued.size - 1)
+    own = Slips(glued[at[kept]], glued[ends], sign * slips.before[kept], slips.drop[kept])
     stage = Stage(float(glued[0]), float(glued[-1]), 1.0)
     glued, along = _even(glued, along)
     scales = Scales.of_measurement(apparatus, stage, along, noise_level(along))
@@ -204,9 +211,9 @@ def regimes_of_results(results: Results) -> Iterator[RegimeResult]:
         slips = np.concatenate(
             [np.empty((0, len(SLIP_COLUMNS))), *one.rows("slips").blocks(MAX_SAMPLES)]
         )
-        columns = ("start_time", "force_before", "force_after")
-        began, before, after = (slips[:, slip_index[name]] for name in columns)
-        yield classify(scales, time, force, velocity, Slips(began, before, before - after))
+        columns = ("start_time", "end_time", "force_before", "force_after")
+        began, ended, before, after = (slips[:, slip_index[name]] for name in columns)
+        yield classify(scales, time, force, velocity, Slips(began, ended, before, before - after))
 
 
 def _step(count: int) -> int:

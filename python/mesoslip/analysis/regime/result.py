@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 SMOOTH, STICK_SLIP, IRREGULAR, TRANSIENT = range(4)
+# What forces are divided by: the one of a model, or the maximum of a measured force.
+STATIC_FORCE, MAXIMUM_FORCE = "static force", "maximum force"
 NAMES = ("smooth", "stick_slip", "irregular", "transient")
 
 
@@ -54,7 +56,9 @@ class RegimeResult:
     are_slips: bool = _variable(
         "whether the cycles are those from slip to slip", default=False, dtype=np.int8
     )
-    slip_share: float = _variable("force drops of the slips over the loading by the drive, K v t")
+    slip_share: float = _variable(
+        "falls of the force in slips, without rebounds, over the loading by the drive, K v t"
+    )
     period: float = _variable("mean period of the cycles", "s")
     period_variation: float = _variable("coefficient of variation of the periods")
     period_irregularity: float = _variable(
@@ -90,6 +94,11 @@ class RegimeResult:
     slips: int = _variable("slips in the evaluated window", default=0, dtype=np.int64)
     window_start: float = _variable("start of the evaluated window", "s")
     window_end: float = _variable("end of the evaluated window", "s")
+    force_scale: str = STATIC_FORCE
+
+    def long_name(self, name: str) -> str:
+        """The meaning of a variable, with the force that it is divided by."""
+        return REGIME[name].long_name.replace(STATIC_FORCE, self.force_scale)
 
     @property
     def summary(self) -> str:
@@ -97,7 +106,9 @@ class RegimeResult:
         name = NAMES[self.regime].replace("_", "-")
         if not math.isfinite(self.relative_amplitude):
             return f"{name}: too few samples to determine a regime"
-        text = f"{name}: force amplitude {percent(self.relative_amplitude)} of the static force"
+        text = (
+            f"{name}: force amplitude {percent(self.relative_amplitude)} of the {self.force_scale}"
+        )
         if self.regime == SMOOTH:
             return text
         if self.cycles < MIN_CYCLES:
@@ -122,14 +133,14 @@ class RegimeResult:
 
 
 # The variables of outputs.
-REGIME = Group({one.name: one.metadata["meaning"] for one in fields(RegimeResult)})
+REGIME = Group({one.name: one.metadata["meaning"] for one in fields(RegimeResult) if one.metadata})
 
 
 def results_of(data: xr.Dataset) -> list[RegimeResult]:
     """The results in a dataset of `regimes`, one for each realization."""
     columns = {name: data[name].values.tolist() for name in REGIME}
     return [
-        RegimeResult(**dict(zip(columns, row, strict=True)))
+        RegimeResult(**dict(zip(columns, row, strict=True)), force_scale=data.attrs["force_scale"])
         for row in zip(*columns.values(), strict=True)
     ]
 

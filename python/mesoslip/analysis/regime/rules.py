@@ -21,6 +21,7 @@ from mesoslip.analysis.regime.events import (
 )
 from mesoslip.analysis.regime.result import IRREGULAR, SMOOTH, STICK_SLIP, TRANSIENT, RegimeResult
 from mesoslip.analysis.regime.scales import Scales
+from mesoslip.analysis.stick_phases import relieved_loading
 
 Array = NDArray[np.float64]
 
@@ -79,10 +80,8 @@ def classify(
         time, force, np.clip(force, low - excursion, high + excursion), TURNING * (high - low)
     )
     moved = abs(stage.velocity) * (time[-1] - time[0])
-    loading = scales.stiffness * moved
-    slip_share = float(slips.drop.sum()) / loading if 0 < loading < math.inf else math.nan
-    if scales.is_measured:
-        loading = 0.0
+    slip_share = _slip_share(scales, time, force, slips)
+    loading = 0.0 if scales.is_measured else scales.loading_rate * (time[-1] - time[0])
     cycles, are_slips = events_of(slips, cycles, loading)
     change, error = trend(cycles.falls)
     numbers = {
@@ -118,7 +117,7 @@ def classify(
             "stick_share": float(np.mean(velocity < STICKING * abs(stage.velocity))),
         }
     is_renewed = moved >= scales.renewal_displacement
-    result = RegimeResult(**numbers)  # type: ignore[arg-type]
+    result = RegimeResult(force_scale=scales.force_scale, **numbers)  # type: ignore[arg-type]
     regular = SMOOTH_AMPLITUDE * scale / static
     judged = result
     if scales.is_measured and are_slips:
@@ -159,6 +158,17 @@ def _regime(found: RegimeResult, halves: list[float], *, regular: float, is_rene
         WITH_PEAKS if has_peaks else IRREGULAR_PERIODS
     ) or found.fall_irregularity > (WITH_PEAKS if has_peaks else IRREGULAR_FALLS)
     return IRREGULAR if is_irregular else STICK_SLIP
+
+
+def _slip_share(scales: Scales, time: Array, force: Array, slips: Slips) -> float:
+    """Falls of the slips without rebounds over the loading; NaN if the slider does not rest."""
+    rate = scales.loading_rate
+    if not 0 < rate < math.inf:
+        return math.nan
+    if not len(slips):
+        return 0.0
+    fallen, loaded = relieved_loading(time, force, slips.start, slips.end, slips.before)
+    return fallen / (rate * loaded) if loaded > 0 else math.nan
 
 
 def _scatter(values: Array) -> float:

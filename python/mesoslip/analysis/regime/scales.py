@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip.analysis.apparatus import Apparatus
+from mesoslip.analysis.regime.result import MAXIMUM_FORCE, STATIC_FORCE
 from mesoslip.configuration.config import Config
 from mesoslip.output.access import group_of
 from mesoslip.output.arrays import Tree
@@ -57,6 +58,16 @@ class Scales:
     """Whether the drive has a velocity with which that of the slider can be compared."""
     is_measured: bool = False
     """Whether noise and drift may hide cycles and velocities: then slips are the cycles."""
+
+    @property
+    def loading_rate(self) -> float:
+        """Rate at which the drive loads the spring [N/s], K v; 0 in a hold, of a rigid one too."""
+        return self.stiffness * abs(self.stage.velocity) if self.stage.velocity else 0.0
+
+    @property
+    def force_scale(self) -> str:
+        """What forces are divided by."""
+        return MAXIMUM_FORCE if self.is_measured else STATIC_FORCE
 
     @classmethod
     def of_config(cls, config: Config, reached: float) -> Scales:

@@ -26,6 +26,7 @@ from mesoslip.command_line import (
     lyapunov,
     mean_field,
     pictures,
+    plateaus,
     report,
     response,
     run,
@@ -53,6 +54,7 @@ COMMANDS = (
     catalogues.regime,
     response.response,
     strokes.strokes,
+    plateaus.plateaus,
     pictures.plot,
     report.report,
     export.export,
@@ -74,6 +76,7 @@ WITHOUT_XARRAY = {
     report.report,
     response.response,
     strokes.strokes,
+    plateaus.plateaus,
 }
 
 # How to install the libraries that the kernels are linked to.

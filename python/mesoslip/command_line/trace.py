@@ -68,6 +68,13 @@ def trace(
         str | None,
         _option("Spring constant; of friction coefficients as in '1.6e-3 1/um'", "1002 N/m"),
     ] = None,
+    radius: Annotated[
+        str | None,
+        _option("Radius of the track: torques become forces, rotations speeds", "30 mm"),
+    ] = None,
+    viscosity: Annotated[
+        str | None, _option("Viscosity of a lubricant, for Stribeck curves", "90 mPa*s")
+    ] = None,
     normal_force: Annotated[
         str | None, _option("Normal force; friction coefficients become forces", "301 mN")
     ] = None,
@@ -128,6 +135,8 @@ def trace(
         "rate": rate,
         "velocity": velocity,
         "stiffness": stiffness,
+        "radius": radius,
+        "viscosity": viscosity,
         "normal_force": normal_force,
         "normal_stress": normal_stress,
         "area": area,

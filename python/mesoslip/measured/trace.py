@@ -171,6 +171,8 @@ def read_trace(
     rate: str | float | None = None,
     velocity: str | float | None = None,
     stiffness: str | float | None = None,
+    radius: str | float | None = None,
+    viscosity: str | float | None = None,
     normal_force: str | float | None = None,
     normal_stress: str | float | None = None,
     area: str | float | None = None,
@@ -206,6 +208,10 @@ def read_trace(
         Velocity of the drive [m/s], where no load point was recorded.
     stiffness
         Spring constant [N/m]; for friction coefficients with a unit such as "1.6e-3 1/um".
+    radius
+        Radius of the track on a disc [m], by which torques become forces and rotations speeds.
+    viscosity
+        Viscosity of a lubricant [Pa s], for Stribeck curves.
     normal_force
         Normal force [N]; friction coefficients become forces with it.
     normal_stress, area
@@ -254,6 +260,8 @@ def read_trace(
             rate=rate,
             velocity=velocity,
             stiffness=stiffness,
+            radius=radius,
+            viscosity=viscosity,
             normal_force=normal_force,
             normal_stress=normal_stress,
             area=area,
@@ -449,7 +457,10 @@ def _tree(
         "normal_stress": record.normal_stress,
         "revolutions": record.revolutions,
         "rotation_speed": record.rotation_speed,
+        "sliding_speed": record.sliding_speed,
     }
+    if not record.is_friction and record.normal_force is not None:
+        traces["friction_coefficient"] = record.force / _pressing(record.normal_force)
     root = {
         name: variables.ROOT.variable(name, ("realization", "time"), values[np.newaxis])
         for name, values in traces.items()
@@ -475,6 +486,12 @@ def _tree(
         known = np.isfinite(record.load_point)
         groups["/stages"] = stage_group(drive_stages(record.time[known], record.load_point[known]))
     return xr.DataTree.from_dict(groups)
+
+
+def _pressing(normal: Array) -> Array:
+    """A normal force that presses, NaN where there is none; sensors have either sign."""
+    size = np.abs(normal)
+    return np.where(size > 0, size, np.nan)
 
 
 def _names(record: Record) -> dict[str, RecordedColumn]:

@@ -60,7 +60,10 @@ def trace(
             help="Sheet of a workbook; that with the most numbers by default", metavar="NAME"
         ),
     ] = None,
-    rate: Annotated[str | None, _option("Sampling rate, if the file has no times", "1 kHz")] = None,
+    rate: Annotated[
+        str | None,
+        _option("Sampling rate, if the file has no times; else samples are thinned to it", "1 kHz"),
+    ] = None,
     velocity: Annotated[
         str | None, _option("Velocity of the drive, if no load point was recorded", "42 um/s")
     ] = None,

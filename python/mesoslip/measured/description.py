@@ -167,7 +167,7 @@ class TraceDescription(Table):
     sheet: Text | None = None
     """Sheet of a workbook (.xlsx); by default the one with the most numbers."""
     rate: Rate | None = None
-    """Sampling rate, for a file without times."""
+    """Sampling rate of a file without times; of one with times the rate to which it is thinned."""
     part: Annotated[Whole, Field(ge=1)] | None = None
     """Which part of a file whose clock starts again, from 1; by default the longest."""
     start: Time | None = None

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,9 +15,11 @@ from mesoslip.measured.columns import FORCES, Assignment, Used, assign, sentinel
 from mesoslip.measured.description import Column, TraceDescription
 from mesoslip.measured.headers import QUANTITIES, name_of
 from mesoslip.measured.parts import continued, joined
+from mesoslip.measured.reading.blocks import blocks_of
 from mesoslip.measured.reading.file import read_file
 from mesoslip.measured.reading.table import Array, Table, listed
 from mesoslip.measured.sampling import in_order, sampling_report, sampling_summary
+from mesoslip.measured.thinning import thinned
 from mesoslip.quantities import number, with_unit
 
 MIN_SAMPLES = 4
@@ -93,15 +95,7 @@ class Record:
 def read_record(paths: Sequence[Path], trace: TraceDescription) -> Record:
     """Read the files of a measurement; ``trace`` has the properties that they do not contain."""
     path = paths[0]
-    tables = [
-        read_file(
-            one,
-            decimal=trace.decimal,
-            sheet=trace.sheet,
-            has_headers=trace.headers is not None or bool(trace.columns.model_fields_set),
-        )
-        for one in paths
-    ]
+    tables = [_read(one, trace) for one in paths]
     table = joined(tables)
     columns = assign(table, trace.columns, trace.headers)
     _check_needed(table, columns, trace)
@@ -119,12 +113,11 @@ def read_record(paths: Sequence[Path], trace: TraceDescription) -> Record:
         names = _described(table, columns)
         raise FileError(f"{path}: {error}; the other columns are {names}") from None
     force = made.values
-    rate = trace.si("rate")
-    if rate is None:
+    if "time" in values:
         time, moved = continued(values["time"], tables)
         notes += moved
     else:
-        time = np.arange(len(table.lines)) / rate
+        time = np.arange(len(table.lines)) / (trace.si("rate") or 1.0)
     _check_span(time, trace)
     inside = _inside(time, trace)
     whole = np.isfinite(time) & np.isfinite(force)
@@ -172,6 +165,18 @@ def read_record(paths: Sequence[Path], trace: TraceDescription) -> Record:
     )
 
 
+def _read(path: Path, trace: TraceDescription) -> Table:
+    """The table of a file, thinned to a rate that is given beside a column of times."""
+    rate = trace.si("rate")
+    has_headers = trace.headers is not None or bool(trace.columns.model_fields_set)
+    read: Callable[..., Any] = read_file if rate is None else blocks_of
+    found = read(path, decimal=trace.decimal, sheet=trace.sheet, has_headers=has_headers)
+    if rate is not None:
+        found = thinned(found, rate, lambda one: assign(one, trace.columns, trace.headers))
+    table: Table = found
+    return table
+
+
 def resolve(trace: TraceDescription, record: Record) -> TraceDescription:
     """A description with the columns that were found, so that it repeats the reading."""
     columns = dict(trace.columns)
@@ -213,11 +218,6 @@ def _check_needed(table: Table, columns: Assignment, trace: TraceDescription) ->
         raise FileError(
             f"{table.path}: has no column of the time, such as 'time [s]'; its other columns are "
             f"{names}; say what they are with --columns, or give a sampling rate with --rate"
-        )
-    if "time" in used and rate is not None:
-        raise FileError(
-            f"{table.path}: has a column of the time, and a sampling rate is given; give no rate, "
-            "or '-' instead of the time in --columns"
         )
 
 

@@ -203,7 +203,8 @@ def read_trace(
     sheet
         Sheet of a workbook (.xlsx); by default the one with the most numbers.
     rate
-        Sampling rate [1/s], for a file without times.
+        Sampling rate [1/s] of a file without times; one with times is thinned to this rate, after a
+        low-pass.
     velocity
         Velocity of the drive [m/s], where no load point was recorded.
     stiffness

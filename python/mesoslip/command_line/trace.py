@@ -78,6 +78,13 @@ def trace(
     viscosity: Annotated[
         str | None, _option("Viscosity of a lubricant, for Stribeck curves", "90 mPa*s")
     ] = None,
+    motion: Annotated[
+        str | None,
+        typer.Option(
+            help="Whether the drive goes back and forth: strokes, one-way; found by default",
+            metavar="MOTION",
+        ),
+    ] = None,
     normal_force: Annotated[
         str | None, _option("Normal force; friction coefficients become forces", "301 mN")
     ] = None,
@@ -140,6 +147,7 @@ def trace(
         "stiffness": stiffness,
         "radius": radius,
         "viscosity": viscosity,
+        "motion": motion,
         "normal_force": normal_force,
         "normal_stress": normal_stress,
         "area": area,

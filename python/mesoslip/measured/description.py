@@ -186,6 +186,8 @@ class TraceDescription(Table):
     """Viscosity of a lubricant, for Stribeck curves."""
     stiffness: Stiffness | None = None
     """Spring constant; for friction coefficients over displacement, such as "1.6e-3 1/um"."""
+    motion: Literal["strokes", "one-way"] | None = None
+    """Whether the drive goes back and forth; by default from the load point or the force."""
     velocity: Velocity | None = None
     """Velocity of the drive, where no load point was recorded."""
     hum: Frequency | None = None

@@ -115,6 +115,8 @@ class _Thinner:
             table = replace(table, values=table.values[:, whole], lines=table.lines[whole])
             time = table.values[self.time]
         self.template = table
+        # Rounded times have a longer step where they are larger.
+        self.step = _usual_step(time) if time.size > 1 and time[-1] > time[0] else self.step
         before = time[:1] if self.rest is None else self.rest[self.time, -1:]
         steps = np.diff(np.concatenate([before, time]))
         cuts = np.flatnonzero((steps > MIN_GAP * self.step) | (steps < 0))

@@ -173,6 +173,7 @@ def read_trace(
     stiffness: str | float | None = None,
     radius: str | float | None = None,
     viscosity: str | float | None = None,
+    motion: str | None = None,
     normal_force: str | float | None = None,
     normal_stress: str | float | None = None,
     area: str | float | None = None,
@@ -213,6 +214,8 @@ def read_trace(
         Radius of the track on a disc [m], by which torques become forces and rotations speeds.
     viscosity
         Viscosity of a lubricant [Pa s], for Stribeck curves.
+    motion
+        "strokes" or "one-way": whether the drive goes back and forth, if the guess is wrong.
     normal_force
         Normal force [N]; friction coefficients become forces with it.
     normal_stress, area
@@ -263,6 +266,7 @@ def read_trace(
             stiffness=stiffness,
             radius=radius,
             viscosity=viscosity,
+            motion=motion,
             normal_force=normal_force,
             normal_stress=normal_stress,
             area=area,
@@ -302,7 +306,12 @@ def trace_of(understood: Understood) -> xr.DataTree:
         # Impulses and hum are no motion.
         cleaned = noise.clean(record.time, record.force)
         smooth = _displacement(record, cleaned, drive, stiffness)
-    pieces, cut_by = record_pieces(record.time, record.force, drive, record.displacement)
+    pieces, cut_by = record_pieces(
+        record.time, record.force, drive, record.displacement, trace.motion
+    )
+    if pieces is None and trace.motion == "strokes":
+        message = f"the {cut_by} has no reversals that stand out of the noise"
+        raise ConfigError([Problem("", "--motion", message, trace.motion)])
     if pieces is not None:
         # Only its size is known, as the drive goes back and forth.
         velocity = None if drive is None else _mean_speed(record.time, drive)

@@ -61,7 +61,7 @@ def test_torque_and_rotation_with_a_radius(disc):
         ("friction_coefficient", force / load),
     ):
         assert tree[name].values[0] == pytest.approx(values, rel=1e-5)
-    assert "guess: 'load [N]' taken as the normal force" in tree.attrs["understood"]
+    assert "guess: 'load [N]' taken as the normal force, beside" in tree.attrs["understood"]
     assert "force: torque / radius (30 mm)" in tree.attrs["understood"]
     with pytest.raises(FileError, match="give --radius"):
         mesoslip.read_trace(path)

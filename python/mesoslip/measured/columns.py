@@ -304,14 +304,17 @@ def _from_headings(table: Table, headings: Mapping[int, Heading], found: Assignm
         if heading.quantity is not None:
             by_quantity.setdefault(heading.quantity, []).append(index)
     either = by_quantity.pop(EITHER, [])
-    loads = [n for n, one in headings.items() if bare_name(table.headers[n]) == "load" and one.unit]
-    if len(loads) == 1 and set(FORCES) & by_quantity.keys() and "normal_force" not in by_quantity:
-        # Beside a friction, and else perhaps of the spring.
-        (index,) = loads
-        guess = f"{shown(table.headers[index])} taken as the normal force, beside the friction"
-        loaded = Heading("normal_force", headings[index].unit, guess)
-        _use(table, "normal_force", index, loaded, found)
     has_force = not found.used.keys().isdisjoint(FORCES)
+    names = {index: bare_name(table.headers[index]) for index, one in headings.items() if one.unit}
+    loads = [index for index, name in names.items() if name == "load"]
+    is_normal = has_force or bool(set(FORCES) & by_quantity.keys())
+    if len(loads) == 1 and "normal_force" not in by_quantity:
+        # Beside a friction it presses, alone it pulls.
+        (index,) = loads
+        quantity, why = ("normal_force", "beside") if is_normal else ("force", "without")
+        what = quantity.replace("_", " ")
+        guess = f"{shown(table.headers[index])} taken as the {what}, {why} another force"
+        _use(table, quantity, index, Heading(quantity, headings[index].unit, guess), found)
     for quantity, indices in by_quantity.items():
         if quantity in found.used or (has_force and quantity in FORCES):
             continue

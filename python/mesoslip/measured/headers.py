@@ -30,7 +30,8 @@ EITHER = "either"
 # Names of the field, in lower case, without punctuation.
 NAMES = {
     "time": "time|t|elapsed time|time elapsed|test time|run time|relative time|time stamp"
-    "|timestamp|zeit|temps|tiempo|tempo|time axis",
+    "|timestamp|zeit|temps|tiempo|tempo|time axis|x value|step time|pr fzeit|pruefzeit"
+    "|time 1 default sample rate",
     "force": "force|spring force|shear force|shear load|friction force|frictional force"
     "|lateral force|tangential force|horizontal force|pulling force|traction force|drive force"
     "|driving force|kraft|reibkraft|ft|f t|fx|f x|f|fs|force x|force t|force tangential"
@@ -51,7 +52,8 @@ NAMES = {
     "|drive displacement|drive position|stage|stage position|stage displacement|actuator"
     "|actuator displacement|actuator position|motor position|motor displacement"
     "|ram displacement|piston displacement|crosshead|crosshead displacement|carriage position"
-    "|translation stage|puller position|driver position|drive disp|shear actuator displacement",
+    "|translation stage|puller position|driver position|drive disp|shear actuator displacement"
+    "|extension|standardweg",
     "displacement": "slider displacement|slider position|block displacement|block position"
     "|sample displacement|slider|fault slip|slip displacement|slip|slider disp",
     "revolutions": "revolutions|total revolutions|number of revolutions|revolution count|revs"

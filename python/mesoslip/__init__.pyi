@@ -2,6 +2,7 @@ from .analysis.avalanches import avalanche_summary, avalanches
 from .analysis.catalogue_tables import write_table
 from .analysis.export import export
 from .analysis.lyapunov import lyapunov
+from .analysis.plateaus import plateaus
 from .analysis.regime import regime
 from .analysis.response import response
 from .analysis.slips import slips
@@ -59,6 +60,7 @@ __all__ = [
     "mean_field",
     "onset",
     "open_output",
+    "plateaus",
     "plot",
     "predict",
     "read_trace",

@@ -273,6 +273,10 @@ def test_a_given_minimum_fall_is_obeyed(shape):
     else:
         assert abs(len(found) - 80) <= 1
     assert found.min_fall == 0.8
+    # The table of counts has a row for it.
+    at = np.flatnonzero(found.counts.threshold == 0.8)
+    assert found.counts.count[at].tolist() == [len(found)]
+    assert (np.diff(found.counts.threshold) > 0).all()
 
 
 def test_small_slips_are_stick_slip_and_smooth_sliding_has_none(tmp_path):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 
 import mesoslip
 import numpy as np
@@ -392,3 +393,36 @@ def test_a_file_of_a_disc(tmp_path) -> None:  # type: ignore[no-untyped-def]
     assert {"friction_coefficient", "revolutions"} <= set(tree.data_vars)
     found = mesoslip.strokes(tree)
     np.testing.assert_allclose(found["cycles"]["mean_friction"], 0.201, atol=1e-3)
+
+
+def test_a_given_motion_overrules_the_guess() -> None:
+    """A force that never changes its sign is cut into strokes if it is said to; and the reverse."""
+    time = np.arange(0, 20, 0.01)
+    wave = np.clip(4 * np.sin(math.tau * time / 2), -1, 1)
+    noise = 0.01 * np.random.default_rng(1).standard_normal(time.size)
+    assert pieces_of_force(time, 3 + wave + noise) is None
+    forced = pieces_of_force(time, 3 + wave + noise, is_given=True)
+    assert forced is not None
+    assert len(forced) == pytest.approx(20, abs=1)
+    assert record_pieces(time, wave + noise, None)[0] is not None
+    assert record_pieces(time, wave + noise, None, motion="one-way")[0] is None
+    x = np.sin(math.tau * time / 2)
+    assert record_pieces(time, wave + noise, x, motion="one-way")[0] is None
+
+
+def test_the_motion_is_that_of_every_command(tmp_path) -> None:  # type: ignore[no-untyped-def]
+    """The output keeps it; a record without levels is refused."""
+    time = np.arange(0, 20, 0.02)
+    rng = np.random.default_rng(1)
+    force = 3 + np.clip(4 * np.sin(math.tau * time / 2), -1, 1) + 0.01 * rng.standard_normal(1000)
+    path = tmp_path / "a.csv"
+    header = "time [s],force [N]"
+    np.savetxt(path, np.c_[time, force], delimiter=",", header=header, comments="")
+    tree = mesoslip.read_trace(path, motion="strokes")
+    assert mesoslip.strokes(tree)["cycles"]["mean_friction"].values == pytest.approx(1, abs=0.02)
+    assert tree["slips"].sizes["slip"] == 0
+    with pytest.raises(mesoslip.FileError, match="does not go back and forth"):
+        mesoslip.strokes(mesoslip.read_trace(path, motion="one-way"))
+    np.savetxt(path, np.c_[time, 3 + rng.random(1000)], delimiter=",", header=header, comments="")
+    with pytest.raises(mesoslip.ConfigError, match="no reversals that stand out"):
+        mesoslip.read_trace(path, motion="strokes")

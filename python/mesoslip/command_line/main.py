@@ -27,6 +27,7 @@ from mesoslip.command_line import (
     lyapunov,
     mean_field,
     pictures,
+    plateaus,
     report,
     response,
     run,
@@ -55,6 +56,7 @@ COMMANDS = (
     catalogues.regime,
     response.response,
     strokes.strokes,
+    plateaus.plateaus,
     pictures.plot,
     report.report,
     export.export,
@@ -76,6 +78,7 @@ WITHOUT_XARRAY = {
     report.report,
     response.response,
     strokes.strokes,
+    plateaus.plateaus,
 }
 
 # How to install the libraries that the kernels are linked to.

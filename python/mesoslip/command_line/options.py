@@ -75,6 +75,9 @@ TableOption = Annotated[
     ),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON, in SI units")]
+LatexOption = Annotated[bool, typer.Option("--latex", help="Print a LaTeX table")]
+# Rows of a table that are printed.
+MAX_ROWS = 20
 QuietOption = Annotated[bool, typer.Option("--quiet", help="Print no progress")]
 
 
@@ -145,6 +148,15 @@ def print_table(rows: Sequence[Sequence[str]], notes: Sequence[str] = ()) -> Non
         typer.echo(line)
         if note:
             typer.echo(f"{'':{len(line)}}{note}")
+
+
+def print_tables(tables: Sequence[PrintedTable]) -> None:
+    """Print tables with their titles, each up to a maximum number of rows."""
+    for one in tables:
+        typer.echo(f"\n{one.title}")
+        print_table((one.head, *one.rows[:MAX_ROWS]))
+        if len(one.rows) > MAX_ROWS:
+            typer.echo(f"the first {MAX_ROWS} of {len(one.rows)}; all with --csv FILE")
 
 
 def write_table(

@@ -11,14 +11,11 @@ from mesoslip.command_line.options import (
     OutputArgument,
     TableOption,
     print_json,
-    print_table,
+    print_tables,
     quantity_or_none,
     share,
     write_table,
 )
-
-# Rows of a table that are printed.
-MAX_ROWS = 20
 
 
 def strokes(
@@ -60,8 +57,4 @@ def strokes(
         return
     for note in found.notes:
         typer.echo(note)
-    for one in found.tables:
-        typer.echo(f"\n{one.title}")
-        print_table((one.head, *one.rows[:MAX_ROWS]))
-        if len(one.rows) > MAX_ROWS:
-            typer.echo(f"the first {MAX_ROWS} of {len(one.rows)}; all with --csv FILE")
+    print_tables(found.tables)

@@ -60,13 +60,30 @@ def trace(
             help="Sheet of a workbook; that with the most numbers by default", metavar="NAME"
         ),
     ] = None,
-    rate: Annotated[str | None, _option("Sampling rate, if the file has no times", "1 kHz")] = None,
+    rate: Annotated[
+        str | None,
+        _option("Sampling rate, if the file has no times; else samples are thinned to it", "1 kHz"),
+    ] = None,
     velocity: Annotated[
         str | None, _option("Velocity of the drive, if no load point was recorded", "42 um/s")
     ] = None,
     stiffness: Annotated[
         str | None,
         _option("Spring constant; of friction coefficients as in '1.6e-3 1/um'", "1002 N/m"),
+    ] = None,
+    radius: Annotated[
+        str | None,
+        _option("Radius of the track: torques become forces, rotations speeds", "30 mm"),
+    ] = None,
+    viscosity: Annotated[
+        str | None, _option("Viscosity of a lubricant, for Stribeck curves", "90 mPa*s")
+    ] = None,
+    motion: Annotated[
+        str | None,
+        typer.Option(
+            help="Whether the drive goes back and forth: strokes, one-way; found by default",
+            metavar="MOTION",
+        ),
     ] = None,
     normal_force: Annotated[
         str | None, _option("Normal force; friction coefficients become forces", "301 mN")
@@ -128,6 +145,9 @@ def trace(
         "rate": rate,
         "velocity": velocity,
         "stiffness": stiffness,
+        "radius": radius,
+        "viscosity": viscosity,
+        "motion": motion,
         "normal_force": normal_force,
         "normal_stress": normal_stress,
         "area": area,

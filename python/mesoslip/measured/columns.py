@@ -37,6 +37,9 @@ EXAMPLES = {
     "displacement": "displacement [nm]",
     "revolutions": "revolutions [1]",
     "rotation_speed": "rotation_speed [rpm]",
+    "torque": "torque [N m]",
+    "radius": "radius [mm]",
+    "sliding_speed": "sliding_speed [m/s]",
 }
 # Other names in the headers of options and tables.
 OTHER_NAMES = {
@@ -50,6 +53,14 @@ OTHER_NAMES = {
 # numbers that always do.
 SENTINELS = (-9999.0, -99999.0, -999.0, -999.25, -9999.25, 9999.0, 99999.0, 999999.0, -99.99)
 MIN_ALWAYS = 1e30
+# Examples of factors of columns of a voltage, by SI unit.
+EXAMPLE_FACTORS = {
+    "N": "12.4 mN/V",
+    "N*m": "1 N m/V",
+    "m": "0.5 mm/V",
+    "Pa": "2 MPa/V",
+    "s": "1 s/V",
+}
 # Minimum distance from the range of 80 % of the others, over that range.
 SENTINEL_DISTANCE = 1.0
 # Percentage of steps between samples that are those of an ordinary signal.
@@ -57,7 +68,7 @@ USUAL_STEPS = 99.0
 # Maximum correlation of steps of the force with those of the displacement of a slider.
 MAX_SLIDER = -0.3
 # Quantities that are a force or become one, in order of preference.
-FORCES = ("force", "shear_stress", "friction")
+FORCES = ("force", "torque", "shear_stress", "friction")
 
 
 @dataclass
@@ -220,7 +231,7 @@ def size_of_voltage(unit: str) -> float | None:
 
 
 def _factor_example(si: str) -> str:
-    return {"N": "12.4 mN/V", "m": "0.5 mm/V", "Pa": "2 MPa/V", "s": "1 s/V"}.get(si, "0.1 1/V")
+    return EXAMPLE_FACTORS.get(si, "0.1 1/V")
 
 
 def _factor(text: str, unit: str, si: str) -> tuple[float, str]:
@@ -294,6 +305,16 @@ def _from_headings(table: Table, headings: Mapping[int, Heading], found: Assignm
             by_quantity.setdefault(heading.quantity, []).append(index)
     either = by_quantity.pop(EITHER, [])
     has_force = not found.used.keys().isdisjoint(FORCES)
+    names = {index: bare_name(table.headers[index]) for index, one in headings.items() if one.unit}
+    loads = [index for index, name in names.items() if name == "load"]
+    is_normal = has_force or bool(set(FORCES) & by_quantity.keys())
+    if len(loads) == 1 and "normal_force" not in by_quantity:
+        # Beside a friction it presses, alone it pulls.
+        (index,) = loads
+        quantity, why = ("normal_force", "beside") if is_normal else ("force", "without")
+        what = quantity.replace("_", " ")
+        guess = f"{shown(table.headers[index])} taken as the {what}, {why} another force"
+        _use(table, quantity, index, Heading(quantity, headings[index].unit, guess), found)
     for quantity, indices in by_quantity.items():
         if quantity in found.used or (has_force and quantity in FORCES):
             continue

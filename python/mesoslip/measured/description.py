@@ -52,6 +52,8 @@ def _quantity(*units: str, example: str, minimum: float | None = None, is_open: 
 
 # SI units of the quantities of a description, by key.
 UNITS = {
+    "radius": ("m",),
+    "viscosity": ("Pa*s",),
     "rate": ("1/s",),
     "start": ("s",),
     "end": ("s",),
@@ -65,6 +67,8 @@ UNITS = {
     "period": ("s",),
     "min_fall": ("N", "1"),
 }
+Radius = Annotated[str, _quantity(*UNITS["radius"], example="30 mm", minimum=0)]
+Viscosity = Annotated[str, _quantity(*UNITS["viscosity"], example="90 mPa*s", minimum=0)]
 Rate = Annotated[str, _quantity(*UNITS["rate"], example="1 kHz", minimum=0)]
 Time = Annotated[str, _quantity(*UNITS["start"], example="100 s")]
 NormalForce = Annotated[str, _quantity(*UNITS["normal_force"], example="301 mN", minimum=0)]
@@ -137,6 +141,12 @@ class Columns(Table):
     """Number of revolutions of a disc."""
     rotation_speed: ColumnField = None
     """Speed of its rotation, in revolutions per time."""
+    torque: ColumnField = None
+    """Torque of the friction, a force with the radius."""
+    radius: ColumnField = None
+    """Radius of the track on a disc, or of a journal."""
+    sliding_speed: ColumnField = None
+    """Speed of sliding; without it that of the rotation at the radius."""
 
 
 class TraceDescription(Table):
@@ -157,7 +167,7 @@ class TraceDescription(Table):
     sheet: Text | None = None
     """Sheet of a workbook (.xlsx); by default the one with the most numbers."""
     rate: Rate | None = None
-    """Sampling rate, for a file without times."""
+    """Sampling rate of a file without times; of one with times the rate to which it is thinned."""
     part: Annotated[Whole, Field(ge=1)] | None = None
     """Which part of a file whose clock starts again, from 1; by default the longest."""
     start: Time | None = None
@@ -170,8 +180,14 @@ class TraceDescription(Table):
     """Normal stress, if it was not recorded; with `area` a normal force."""
     area: Area | None = None
     """Nominal area, by which stresses become forces."""
+    radius: Radius | None = None
+    """Radius of the track on a disc, by which torques become forces and rotations speeds."""
+    viscosity: Viscosity | None = None
+    """Viscosity of a lubricant, for Stribeck curves."""
     stiffness: Stiffness | None = None
     """Spring constant; for friction coefficients over displacement, such as "1.6e-3 1/um"."""
+    motion: Literal["strokes", "one-way"] | None = None
+    """Whether the drive goes back and forth; by default from the load point or the force."""
     velocity: Velocity | None = None
     """Velocity of the drive, where no load point was recorded."""
     hum: Frequency | None = None

@@ -20,6 +20,9 @@ QUANTITIES = {
     "displacement": "m",
     "revolutions": "1",
     "rotation_speed": "1/s",
+    "torque": "N*m",
+    "radius": "m",
+    "sliding_speed": "m/s",
 }
 # A displacement, of the load point or of the slider.
 EITHER = "either"
@@ -27,7 +30,8 @@ EITHER = "either"
 # Names of the field, in lower case, without punctuation.
 NAMES = {
     "time": "time|t|elapsed time|time elapsed|test time|run time|relative time|time stamp"
-    "|timestamp|zeit|temps|tiempo|tempo|time axis",
+    "|timestamp|zeit|temps|tiempo|tempo|time axis|x value|step time|pr fzeit|pruefzeit"
+    "|time 1 default sample rate",
     "force": "force|spring force|shear force|shear load|friction force|frictional force"
     "|lateral force|tangential force|horizontal force|pulling force|traction force|drive force"
     "|driving force|kraft|reibkraft|ft|f t|fx|f x|f|fs|force x|force t|force tangential"
@@ -36,9 +40,11 @@ NAMES = {
     "friction": "friction|friction coefficient|coefficient of friction|friction coeff"
     "|friction coef|coef of friction|coeff of friction|cof|mu|f mg|f over mg|f over n|f fn"
     "|f over fn|f w|ft fn|f t f n|apparent friction|tau sigma|tau over sigma|tau sigma n|tau sn"
-    "|friction factor|reibwert|reibungskoeffizient|mu app|shear stress normal stress|ff fn",
+    "|friction factor|reibwert|reibungskoeffizient|reibungszahl|mu app"
+    "|shear stress normal stress|ff fn|traction|traction coefficient|traction coeff",
     "normal_force": "normal|normal force|normal load|normalforce|normalload|fn|f n|vertical force"
-    "|vertical load|normalkraft|force normal|force n|fz|f z|nload",
+    "|vertical load|normalkraft|force normal|force n|fz|f z|nload|applied load|axial load"
+    "|axial force|ball load|belastung",
     "normal_stress": "normal stress|normalstress|sigma n|sigman|sigma|σ|σn|sn"
     "|effective normal stress|eff normal stress|norm stress|stress normal|sigma eff",
     "load_point": "load point|loadpoint|load point displacement|load point disp|load point displ"
@@ -46,13 +52,19 @@ NAMES = {
     "|drive displacement|drive position|stage|stage position|stage displacement|actuator"
     "|actuator displacement|actuator position|motor position|motor displacement"
     "|ram displacement|piston displacement|crosshead|crosshead displacement|carriage position"
-    "|translation stage|puller position|driver position|drive disp|shear actuator displacement",
+    "|translation stage|puller position|driver position|drive disp|shear actuator displacement"
+    "|extension|standardweg",
     "displacement": "slider displacement|slider position|block displacement|block position"
     "|sample displacement|slider|fault slip|slip displacement|slip|slider disp",
     "revolutions": "revolutions|total revolutions|number of revolutions|revolution count|revs"
     "|turns",
     "rotation_speed": "rotation speed|rotational speed|speed of rotation|spindle speed"
-    "|rotation frequency|rpm|drehzahl",
+    "|rotation frequency|rpm|drehzahl|angular velocity|angular speed",
+    "torque": "torque|friction torque|frictional torque|moment|drehmoment|reibmoment|mz|tz",
+    "radius": "radius|track radius|wear track radius|disc radius|disk radius|mean radius",
+    "sliding_speed": "sliding speed|sliding velocity|speed|velocity|linear speed|linear velocity"
+    "|surface speed|surface velocity|entrainment speed|rolling speed|gleitgeschwindigkeit"
+    "|geschwindigkeit|load point velocity|lp velocity|drive velocity|slip rate",
     EITHER: "displacement|displ|disp|position|pos|x|distance|travel|horizontal displacement"
     "|shear displacement|weg|deplacement|horizontal disp|shear disp|x position",
 }  # fmt: skip
@@ -60,6 +72,7 @@ NAMES = {
 BY_UNIT = {
     "shear": {"N": "force", "Pa": "shear_stress"},
     "normal": {"N": "normal_force", "Pa": "normal_stress"},
+    "speed": {"1/s": "rotation_speed", "m/s": "sliding_speed"},
 }
 LIKE = {
     "force": "shear",
@@ -67,6 +80,8 @@ LIKE = {
     "friction": "shear",
     "normal_force": "normal",
     "normal_stress": "normal",
+    "rotation_speed": "speed",
+    "sliding_speed": "speed",
 }
 MEANINGS = {name: quantity for quantity, names in NAMES.items() for name in names.split("|")}
 

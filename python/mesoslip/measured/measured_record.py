@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,9 +15,11 @@ from mesoslip.measured.columns import FORCES, Assignment, Used, assign, sentinel
 from mesoslip.measured.description import Column, TraceDescription
 from mesoslip.measured.headers import QUANTITIES, name_of
 from mesoslip.measured.parts import continued, joined
+from mesoslip.measured.reading.blocks import blocks_of
 from mesoslip.measured.reading.file import read_file
 from mesoslip.measured.reading.table import Array, Table, listed
 from mesoslip.measured.sampling import in_order, sampling_report, sampling_summary
+from mesoslip.measured.thinning import thinned
 from mesoslip.quantities import number, with_unit
 
 MIN_SAMPLES = 4
@@ -28,6 +31,7 @@ OTHERS = (
     "normal_stress",
     "revolutions",
     "rotation_speed",
+    "sliding_speed",
 )
 WORDS = {
     "load_point": "load point",
@@ -36,6 +40,7 @@ WORDS = {
     "normal_force": "normal force",
     "normal_stress": "normal stress",
     "rotation_speed": "rotation speed",
+    "sliding_speed": "sliding speed",
 }
 
 
@@ -72,6 +77,8 @@ class Record:
     """Number of revolutions of a disc."""
     rotation_speed: Array | None
     """Revolutions per second."""
+    sliding_speed: Array | None
+    """Speed of sliding [m/s]."""
     columns: Sequence[RecordedColumn]
     """All columns of numbers of the file, with the rows that are not used."""
     report: Sequence[str]
@@ -88,15 +95,7 @@ class Record:
 def read_record(paths: Sequence[Path], trace: TraceDescription) -> Record:
     """Read the files of a measurement; ``trace`` has the properties that they do not contain."""
     path = paths[0]
-    tables = [
-        read_file(
-            one,
-            decimal=trace.decimal,
-            sheet=trace.sheet,
-            has_headers=trace.headers is not None or bool(trace.columns.model_fields_set),
-        )
-        for one in paths
-    ]
+    tables = [_read(one, trace) for one in paths]
     table = joined(tables)
     columns = assign(table, trace.columns, trace.headers)
     _check_needed(table, columns, trace)
@@ -109,16 +108,16 @@ def read_record(paths: Sequence[Path], trace: TraceDescription) -> Record:
         notes += [note] if note else []
     try:
         made = _force(values, trace)
+        notes += _complete(values, made, trace)
     except ValueError as error:
         names = _described(table, columns)
         raise FileError(f"{path}: {error}; the other columns are {names}") from None
     force = made.values
-    rate = trace.si("rate")
-    if rate is None:
+    if "time" in values:
         time, moved = continued(values["time"], tables)
         notes += moved
     else:
-        time = np.arange(len(table.lines)) / rate
+        time = np.arange(len(table.lines)) / (trace.si("rate") or 1.0)
     _check_span(time, trace)
     inside = _inside(time, trace)
     whole = np.isfinite(time) & np.isfinite(force)
@@ -154,7 +153,7 @@ def read_record(paths: Sequence[Path], trace: TraceDescription) -> Record:
         order.time,
         force[picked],
         made.is_friction,
-        made.normal,
+        made.mean_normal,
         **{name: values[name][picked] if name in values else None for name in OTHERS},
         columns=[
             _recorded(table, columns, index)
@@ -164,6 +163,18 @@ def read_record(paths: Sequence[Path], trace: TraceDescription) -> Record:
         report=[*before, *sampling_report(order.time), *after],
         summary=[*before, *sampling_summary(order.time), *after],
     )
+
+
+def _read(path: Path, trace: TraceDescription) -> Table:
+    """The table of a file, thinned to a rate that is given beside a column of times."""
+    rate = trace.si("rate")
+    has_headers = trace.headers is not None or bool(trace.columns.model_fields_set)
+    read: Callable[..., Any] = read_file if rate is None else blocks_of
+    found = read(path, decimal=trace.decimal, sheet=trace.sheet, has_headers=has_headers)
+    if rate is not None:
+        found = thinned(found, rate, lambda one: assign(one, trace.columns, trace.headers))
+    table: Table = found
+    return table
 
 
 def resolve(trace: TraceDescription, record: Record) -> TraceDescription:
@@ -208,11 +219,6 @@ def _check_needed(table: Table, columns: Assignment, trace: TraceDescription) ->
             f"{table.path}: has no column of the time, such as 'time [s]'; its other columns are "
             f"{names}; say what they are with --columns, or give a sampling rate with --rate"
         )
-    if "time" in used and rate is not None:
-        raise FileError(
-            f"{table.path}: has a column of the time, and a sampling rate is given; give no rate, "
-            "or '-' instead of the time in --columns"
-        )
 
 
 def _described(table: Table, columns: Assignment) -> str:
@@ -227,12 +233,42 @@ def _described(table: Table, columns: Assignment) -> str:
 
 
 class Force(NamedTuple):
-    """A force [N] or friction coefficient, a line about it, and the mean normal force [N]."""
+    """A force [N] or friction coefficient, a line about it, and the normal force [N]."""
 
     values: Array
     is_friction: bool
     line: str
-    normal: float | None
+    normal: Array | float | None
+
+    @property
+    def mean_normal(self) -> float | None:
+        """Mean normal force [N]."""
+        return None if self.normal is None else float(np.nanmean(self.normal))
+
+
+def _complete(values: dict[str, Array], made: Force, trace: TraceDescription) -> list[str]:
+    """Add the quantities that follow from others, and lines about them."""
+    lines = []
+    if made.normal is not None:
+        values["normal_force"] = np.broadcast_to(made.normal, made.values.shape)
+    radius = _radius(values, trace)
+    if radius is not None and "rotation_speed" in values and "sliding_speed" not in values:
+        values["sliding_speed"] = math.tau * radius * np.abs(values["rotation_speed"])
+        lines.append(
+            f"sliding speed: 2 pi x radius ({_mean(radius, 'm')}) x rotation speed, "
+            f"{_range(values['sliding_speed'], 'sliding_speed')}"
+        )
+    return lines
+
+
+def _radius(values: dict[str, Array], trace: TraceDescription) -> Array | float | None:
+    """Radius of the track [m]; one that is given goes before a column."""
+    given = trace.si("radius")
+    return values.get("radius") if given is None else given
+
+
+def _mean(values: Array | float, unit: str) -> str:
+    return with_unit(float(np.nanmean(values)), unit)
 
 
 def _force(values: dict[str, Array], trace: TraceDescription) -> Force:
@@ -245,14 +281,19 @@ def _force(values: dict[str, Array], trace: TraceDescription) -> Force:
     from_what = "normal force"
     if normal is None and stress is not None and area is not None:
         normal, from_what = stress * area, "normal stress x area"
-    mean = None if normal is None else float(np.nanmean(normal))
     if "force" in values:
-        return Force(values["force"], False, "force: as recorded", mean)
+        return Force(values["force"], False, "force: as recorded", normal)
+    if "torque" in values:
+        radius = _radius(values, trace)
+        if radius is None:
+            raise ValueError("the force is a torque: give --radius, such as '30 mm'")
+        line = f"force: torque / radius ({_mean(radius, 'm')})"
+        return Force(values["torque"] / radius, False, line, normal)
     if "shear_stress" in values:
         shear = values["shear_stress"]
         if area is not None:
             line = f"force: shear stress x area ({number(area, 6)} m^2)"
-            return Force(shear * area, False, line, mean)
+            return Force(shear * area, False, line, normal)
         if stress is None and normal is not None:
             raise ValueError("a shear stress and a normal force need an area: give --area")
         if stress is not None:
@@ -264,11 +305,11 @@ def _force(values: dict[str, Array], trace: TraceDescription) -> Force:
                 "to make it a friction coefficient"
             )
     friction = values["friction"]
-    if normal is None or mean is None:
+    if normal is None:
         line = "friction coefficient: as recorded (no normal force is known)"
         return Force(friction, True, line, None)
-    line = f"force: friction coefficient x {from_what} ({with_unit(mean, 'N')})"
-    return Force(friction * normal, False, line, mean)
+    line = f"force: friction coefficient x {from_what} ({_mean(normal, 'N')})"
+    return Force(friction * normal, False, line, normal)
 
 
 def _check_span(time: Array, trace: TraceDescription) -> None:

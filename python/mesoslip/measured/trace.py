@@ -171,6 +171,9 @@ def read_trace(
     rate: str | float | None = None,
     velocity: str | float | None = None,
     stiffness: str | float | None = None,
+    radius: str | float | None = None,
+    viscosity: str | float | None = None,
+    motion: str | None = None,
     normal_force: str | float | None = None,
     normal_stress: str | float | None = None,
     area: str | float | None = None,
@@ -201,11 +204,18 @@ def read_trace(
     sheet
         Sheet of a workbook (.xlsx); by default the one with the most numbers.
     rate
-        Sampling rate [1/s], for a file without times.
+        Sampling rate [1/s] of a file without times; one with times is thinned to this rate, after a
+        low-pass.
     velocity
         Velocity of the drive [m/s], where no load point was recorded.
     stiffness
         Spring constant [N/m]; for friction coefficients with a unit such as "1.6e-3 1/um".
+    radius
+        Radius of the track on a disc [m], by which torques become forces and rotations speeds.
+    viscosity
+        Viscosity of a lubricant [Pa s], for Stribeck curves.
+    motion
+        "strokes" or "one-way": whether the drive goes back and forth, if the guess is wrong.
     normal_force
         Normal force [N]; friction coefficients become forces with it.
     normal_stress, area
@@ -254,6 +264,9 @@ def read_trace(
             rate=rate,
             velocity=velocity,
             stiffness=stiffness,
+            radius=radius,
+            viscosity=viscosity,
+            motion=motion,
             normal_force=normal_force,
             normal_stress=normal_stress,
             area=area,
@@ -293,7 +306,12 @@ def trace_of(understood: Understood) -> xr.DataTree:
         # Impulses and hum are no motion.
         cleaned = noise.clean(record.time, record.force)
         smooth = _displacement(record, cleaned, drive, stiffness)
-    pieces, cut_by = record_pieces(record.time, record.force, drive, record.displacement)
+    pieces, cut_by = record_pieces(
+        record.time, record.force, drive, record.displacement, trace.motion
+    )
+    if pieces is None and trace.motion == "strokes":
+        message = f"the {cut_by} has no reversals that stand out of the noise"
+        raise ConfigError([Problem("", "--motion", message, trace.motion)])
     if pieces is not None:
         # Only its size is known, as the drive goes back and forth.
         velocity = None if drive is None else _mean_speed(record.time, drive)
@@ -449,7 +467,10 @@ def _tree(
         "normal_stress": record.normal_stress,
         "revolutions": record.revolutions,
         "rotation_speed": record.rotation_speed,
+        "sliding_speed": record.sliding_speed,
     }
+    if not record.is_friction and record.normal_force is not None:
+        traces["friction_coefficient"] = record.force / _pressing(record.normal_force)
     root = {
         name: variables.ROOT.variable(name, ("realization", "time"), values[np.newaxis])
         for name, values in traces.items()
@@ -475,6 +496,12 @@ def _tree(
         known = np.isfinite(record.load_point)
         groups["/stages"] = stage_group(drive_stages(record.time[known], record.load_point[known]))
     return xr.DataTree.from_dict(groups)
+
+
+def _pressing(normal: Array) -> Array:
+    """A normal force that presses, NaN where there is none; sensors have either sign."""
+    size = np.abs(normal)
+    return np.where(size > 0, size, np.nan)
 
 
 def _names(record: Record) -> dict[str, RecordedColumn]:

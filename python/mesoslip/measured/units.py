@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from functools import cache
 from typing import NamedTuple
@@ -26,9 +27,13 @@ WORDS = {
     "pascal": "Pa", "pascals": "Pa", "bar": "bar", "bars": "bar", "psi": "psi", "atm": "atm",
     "volt": "V", "volts": "V", "millivolt": "mV", "millivolts": "mV",
     "hertz": "Hz", "percent": "%", "%": "%", "rpm": "rpm",
+    "1/min": "rpm", "min-1": "rpm", "u/min": "rpm", "rev/min": "rpm", "r/min": "rpm",
+    "rad/s": "rad/s", "rad s-1": "rad/s", "deg/s": "deg/s", "rev/s": "Hz", "rps": "Hz",
 }  # fmt: skip
 # Symbols, whose case matters, except those without another meaning.
 SYMBOL = re.compile(r"(?P<prefix>[fpnumckMG]?)(?P<unit>m|s|N|Pa|V|Hz)")
+# A unit of a torque: "Nm", "mN m", "N·mm".
+TORQUE = re.compile(r"(?P<force>[numk]?N)[\s.·⋅*-]?(?P<length>[umc]?m)")
 # Factors of units such as "um/s", "N/mm^2".
 POWER = re.compile(r"(?P<name>[A-Za-z]+)(?:\^|\*\*)?(?P<power>-?[1-9])?")
 CASELESS = {"mpa": "MPa", "kpa": "kPa", "gpa": "GPa", "pa": "Pa", "n": "N", "kn": "kN"} | {
@@ -52,6 +57,8 @@ SIZES = {
     "h": (3600.0, "s"),
     "%": (0.01, "1"),
     "rpm": (1 / 60, "1/s"),
+    "rad/s": (1 / math.tau, "1/s"),
+    "deg/s": (1 / 360, "1/s"),
     "V": (1.0, "V"),
     "mV": (1e-3, "V"),
     "uV": (1e-6, "V"),
@@ -90,6 +97,9 @@ def unit_named(text: str) -> str | None:
 def _factor(text: str) -> str | None:
     if SYMBOL.fullmatch(text):
         return text
+    torque = TORQUE.fullmatch(text)
+    if torque:
+        return f"{torque['force']}*{torque['length']}"
     return WORDS.get(text.lower()) or CASELESS.get(text.lower())
 
 

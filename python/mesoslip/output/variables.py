@@ -97,6 +97,7 @@ MEASURED = Group(
     normal_stress=Meaning("Pa", "normal stress"),
     revolutions=Meaning("1", "number of revolutions of the disc"),
     rotation_speed=Meaning("s-1", "revolutions of the disc per time"),
+    sliding_speed=Meaning("m s-1", "speed of sliding"),
 )
 FORCES = ("spring_force", "friction_coefficient")
 

@@ -47,6 +47,17 @@ class SlipCounts:
     plateau: tuple[float, float] | None = None
     """First and last minimum fall of the range in which the number hardly changes, if any."""
 
+    def with_row(self, threshold: float, count: int, mirrored_count: int) -> SlipCounts:
+        """The counts with those of another minimum fall, such as a given one."""
+        rest = self.threshold != threshold
+        at = int(np.searchsorted(self.threshold[rest], threshold))
+        columns = (
+            (self.threshold, threshold),
+            (self.count, count),
+            (self.mirrored_count, mirrored_count),
+        )
+        return SlipCounts(*(np.insert(one[rest], at, new) for one, new in columns), self.plateau)
+
 
 class Choice(NamedTuple):
     """The chosen median and minimum fall, and the slips there."""

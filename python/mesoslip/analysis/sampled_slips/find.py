@@ -78,7 +78,7 @@ def find_slips(
     sigma = noise.total_deviation if isinstance(noise, TraceNoise) else noise
     every = list(levels(time, cleaned, noise, period=period, loading_rate=loading_rate))
     choice = chosen(every)
-    level, tops, bottoms = choice.level, choice.tops, choice.bottoms
+    level, tops, bottoms, counts = choice.level, choice.tops, choice.bottoms, choice.counts
     if min_fall is None:
         min_fall = choice.min_fall
     else:
@@ -87,8 +87,9 @@ def find_slips(
         widest = fall_period(time, whole.force, *whole.exceeding(min_fall)) / 4
         level = [one for one in every if one is every[0] or one.width <= widest][-1]
         tops, bottoms = level.trace.exceeding(min_fall)
+        counts = counts.with_row(min_fall, tops.size, level.steep_counts(min_fall)[1])
     if tops.size == 0:
-        return _none(period, min_fall, choice.counts)
+        return _none(period, min_fall, counts)
     if period is None:
         period = fall_period(time, level.trace.force, tops, bottoms)
     rates = fall_rates(level, period, tops, bottoms)
@@ -108,7 +109,7 @@ def find_slips(
         last,
         min_fall,
         period,
-        choice.counts,
+        counts,
     )
 
 

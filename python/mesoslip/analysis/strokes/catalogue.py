@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip.analysis.apparatus import apparatus_of
+from mesoslip.analysis.printed_columns import printed_columns
 from mesoslip.analysis.strokes.cycles import Cycle, Overall, cycles_of, overall
 from mesoslip.analysis.strokes.measure import MIDDLE, Measured, Stroke, measure_all
 from mesoslip.analysis.strokes.record import StrokeRecord, record_of
@@ -24,7 +25,7 @@ from mesoslip.output.inputs import OutputLike, opened_run_arrays
 from mesoslip.output.table_files import PrintedTable
 from mesoslip.output.targets import written_whole
 from mesoslip.output.variables import Group
-from mesoslip.quantities import column, with_error
+from mesoslip.quantities import with_error
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -57,8 +58,6 @@ CYCLE_HEADS = {
 OVERALL = ("mean_friction", "mean_friction_coefficient", "loop_energy", "offset", "stiffness")
 # Units for print where the force is a coefficient.
 COEFFICIENTS = {"N": "1", "N/m": "1/m", "J": "m"}
-# Significant digits of columns without errors.
-DIGITS = 4
 
 
 @dataclass(frozen=True)
@@ -95,8 +94,11 @@ class Strokes:
     def tables(self) -> list[PrintedTable]:
         """Strokes, cycles, and the means over cycles, for print."""
         tables = [
-            self._table("Strokes", "strokes", STROKE_HEADS),
-            self._table("Cycles", "cycles", CYCLE_HEADS),
+            printed_columns(title, self.columns[group], heads, self._unit)
+            for title, group, heads in (
+                ("Strokes", "strokes", STROKE_HEADS),
+                ("Cycles", "cycles", CYCLE_HEADS),
+            )
         ]
         if self.overall:
             rows = []
@@ -118,30 +120,6 @@ class Strokes:
 
     def _unit(self, unit: str) -> str:
         return COEFFICIENTS.get(unit, unit) if self.force_unit == "1" else unit
-
-    def _table(self, title: str, group: str, heads: Mapping[str, tuple[str, str]]) -> PrintedTable:
-        columns = self.columns[group]
-        cells = []
-        if columns["realization_index"].any():
-            cells.append(("realization", *map(str, columns["realization_index"].tolist())))
-        for name, (head, unit) in heads.items():
-            values = columns[name].astype(float)
-            if values.size and not np.isfinite(values).any():
-                continue
-            if columns[name].dtype.kind == "i":
-                cells.append(
-                    (
-                        head,
-                        *(f"{one:+.0f}" if name == "direction" else f"{one:.0f}" for one in values),
-                    )
-                )
-                continue
-            shown = column(values.tolist(), self._unit(unit), 7 if name == "start_time" else DIGITS)
-            errors = columns.get(f"{name}_error", np.full(values.size, np.nan))
-            texts = map(shown.text, values.tolist(), errors.tolist())
-            cells.append((shown.head(head), *texts))
-        names, *rows = zip(*cells, strict=True)
-        return PrintedTable(title, names, tuple(rows))
 
     def write_csv(self, path: Path) -> None:
         """Write strokes and cycles as two tables, with an empty line between them."""

@@ -9,6 +9,7 @@ direction.
 from __future__ import annotations
 
 import math
+import tomllib
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -22,6 +23,8 @@ from mesoslip.output.variables import FORCES
 
 Array = NDArray[np.float64]
 
+# Motions that are given.
+STROKES, ONE_WAY = "strokes", "one-way"
 # Name of the quantity by which strokes are guessed.
 FORCE = "sign of the force"
 # Displacements by which strokes are found, in order of preference, and their variables.
@@ -65,17 +68,24 @@ class Piece(NamedTuple):
 
 
 def record_pieces(
-    time: Array, force: Array, drive: Array | None, displacement: Array | None = None
+    time: Array,
+    force: Array,
+    drive: Array | None,
+    displacement: Array | None = None,
+    motion: str | None = None,
 ) -> tuple[tuple[Piece, ...] | None, str]:
     """Pieces of a record, and the quantity in which they were found.
 
     That is the load point, or else the displacement of the slider, or else the sign of the force,
-    which is a guess. The pieces are None if the record does not go back and forth.
+    which is a guess. The pieces are None if the record does not go back and forth. A motion that is
+    given, `STROKES` or `ONE_WAY`, overrules the guess.
     """
     for values, name in zip((drive, displacement), POSITIONS, strict=True):
         if values is not None and np.isfinite(values).any():
-            return monotone_pieces(values), name
-    return pieces_of_force(time, force), FORCE
+            return None if motion == ONE_WAY else monotone_pieces(values), name
+    if motion == ONE_WAY:
+        return None, FORCE
+    return pieces_of_force(time, force, is_given=motion == STROKES), FORCE
 
 
 def output_pieces(tree: Tree, realization: int = 0) -> tuple[tuple[Piece, ...] | None, str]:
@@ -87,7 +97,8 @@ def output_pieces(tree: Tree, realization: int = 0) -> tuple[tuple[Piece, ...] |
     )
     # Forces are missing after the end of an interrupted run only.
     known = np.isfinite(force)
-    return record_pieces(root["time"].values[known], force[known], drive, displacement)
+    motion = tomllib.loads(tree.attrs.get("trace", "")).get("trace", {}).get("motion")
+    return record_pieces(root["time"].values[known], force[known], drive, displacement, motion)
 
 
 def back_and_forth(count: int, name: str) -> str:
@@ -96,7 +107,7 @@ def back_and_forth(count: int, name: str) -> str:
     if name != FORCE:
         return text
     return (
-        f"guess, by the {name}: {text}; give the velocity of the drive if it moves in one direction"
+        f"guess, by the {name}: {text}; give --motion one-way if the drive moves in one direction"
     )
 
 
@@ -135,8 +146,12 @@ def monotone_pieces(displacement: Array) -> tuple[Piece, ...] | None:
     )
 
 
-def pieces_of_force(time: Array, force: Array) -> tuple[Piece, ...] | None:
+def pieces_of_force(
+    time: Array, force: Array, *, is_given: bool = False
+) -> tuple[Piece, ...] | None:
     """Pieces guessed from the sign of a force; None if it does not look like friction in strokes.
+
+    If it is given that they are strokes, the force needs two levels only, of any sign.
 
     The force has levels of opposite signs, at which it is most of the time, and passes from one to
     the other about as fast as back. Slips fall faster than the force rises.
@@ -144,7 +159,8 @@ def pieces_of_force(time: Array, force: Array) -> tuple[Piece, ...] | None:
     if force.size < 4 * MIN_CHANGES:
         return None
     low, high = (float(one) for one in np.quantile(force, LEVELS))
-    if not low < 0 < high or min(-low, high) < MIN_RATIO * max(-low, high):
+    is_signed = low < 0 < high and min(-low, high) >= MIN_RATIO * max(-low, high)
+    if not (is_signed or is_given):
         return None
     middle, half = (low + high) / 2, (high - low) / 2
     if 2 * half * (1 - BEYOND) < _range_of_noise(force) / 2:
@@ -153,13 +169,13 @@ def pieces_of_force(time: Array, force: Array) -> tuple[Piece, ...] | None:
     side[force < middle - BEYOND * half] = -1
     beyond = np.flatnonzero(side)
     change = np.flatnonzero(np.diff(side[beyond]))
-    if change.size < MIN_CHANGES or beyond.size < MIN_SHARE * force.size:
+    if change.size < MIN_CHANGES or (beyond.size < MIN_SHARE * force.size and not is_given):
         return None
     last, next_one = beyond[change], beyond[change + 1]
     took = time[next_one] - time[last]
     rising = side[next_one] > 0
     rise, fall = float(np.median(took[rising])), float(np.median(took[~rising]))
-    if not 1 / MAX_ASYMMETRY <= rise / fall <= MAX_ASYMMETRY:
+    if not (is_given or 1 / MAX_ASYMMETRY <= rise / fall <= MAX_ASYMMETRY):
         return None
     noise = 3 * noise_level(force)
     # The force leaves its level as long before as it would take at this rate.

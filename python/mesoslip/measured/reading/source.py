@@ -37,8 +37,8 @@ COMPRESSIONS: dict[str, tuple[bytes, Callable[[IO[bytes]], Any]]] = {
 }
 
 
-def bytes_of(path: Path) -> bytes:
-    """The bytes of a file, decompressed."""
+def check_file(path: Path) -> None:
+    """Check that a path is that of a regular file."""
     try:
         if is_directory(path):
             raise FileError(f"{path}: is a directory, not a file of a measurement")
@@ -46,13 +46,21 @@ def bytes_of(path: Path) -> bytes:
             raise FileError(f"{path}: no such file")
         if not is_file(path):
             raise FileError(f"{path}: is not a regular file")
+    except OSError as error:
+        raise FileError(f"{path}: cannot be read: {error.strerror}") from None
+    except ValueError as error:
+        raise FileError(f"{path!r}: is not the name of a file: {error}") from None
+
+
+def bytes_of(path: Path) -> bytes:
+    """The bytes of a file, decompressed."""
+    check_file(path)
+    try:
         if path.stat().st_size > MAX_BYTES:
             raise FileError(f"{path}: is too large; the maximum is {MAX_BYTES / 2**30:.0f} GiB")
         data = path.read_bytes()
     except OSError as error:
         raise FileError(f"{path}: cannot be read: {error.strerror}") from None
-    except ValueError as error:
-        raise FileError(f"{path!r}: is not the name of a file: {error}") from None
     return _decompressed(path, data)
 
 

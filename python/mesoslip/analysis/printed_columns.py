@@ -1,0 +1,46 @@
+"""Columns of a catalogue as a table for print, numbers with their errors in one unit a column."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mesoslip.output.table_files import PrintedTable
+from mesoslip.quantities import column
+
+# Significant digits of columns without errors, and of times.
+DIGITS, TIME_DIGITS = 4, 7
+
+
+def printed_columns(
+    title: str,
+    columns: Mapping[str, NDArray[Any]],
+    heads: Mapping[str, tuple[str, str]],
+    unit_of: Callable[[str], str],
+) -> PrintedTable:
+    """A table of the columns with a header and an SI unit; those without numbers are left out.
+
+    ``unit_of`` replaces a unit, as in records of friction coefficients. The realization is a column
+    where there are several.
+    """
+    cells = []
+    if columns["realization_index"].any():
+        cells.append(("realization", *map(str, columns["realization_index"].tolist())))
+    for name, (head, unit) in heads.items():
+        values = columns[name].astype(float)
+        if values.size and not np.isfinite(values).any():
+            continue
+        if columns[name].dtype.kind == "i":
+            sign = "+" if name == "direction" else ""
+            cells.append((head, *(f"{one:{sign}.0f}" for one in values)))
+            continue
+        digits = TIME_DIGITS if name == "start_time" else DIGITS
+        shown = column(values.tolist(), unit_of(unit), digits)
+        errors = columns.get(f"{name}_error", np.full(values.size, np.nan))
+        texts = map(shown.text, values.tolist(), errors.tolist())
+        cells.append((shown.head(head), *texts))
+    names, *rows = zip(*cells, strict=True)
+    return PrintedTable(title, names, tuple(rows))

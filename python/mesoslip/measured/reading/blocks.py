@@ -1,0 +1,83 @@
+"""Long texts block by block, each as a table, in bounded memory."""
+
+from __future__ import annotations
+
+import lzma
+from collections.abc import Iterator
+from contextlib import nullcontext
+from dataclasses import replace
+from pathlib import Path
+from typing import IO, Any
+
+from mesoslip.errors import FileError
+from mesoslip.measured.reading.file import READERS, read_file
+from mesoslip.measured.reading.source import COMPRESSIONS, NEWLINE, check_file, text_of
+from mesoslip.measured.reading.table import BadCell, Table
+from mesoslip.measured.reading.text import read_text
+
+# Size of a block [bytes].
+BLOCK = 2**26
+# First bytes of files that are read as a whole: of archives, workbooks and UTF-16.
+WHOLE = (b"PK", b"\xff\xfe", b"\xfe\xff", *(one.start for one in READERS))
+
+
+def blocks_of(
+    path: Path, *, decimal: str | None = None, has_headers: bool = False, sheet: str | None = None
+) -> Iterator[Table]:
+    """The tables of the blocks of a text; other files are one block. See `read_file`."""
+    check_file(path)
+    with path.open("rb") as file:
+        head = file.read(8)
+    name = next((key for key, (start, _) in COMPRESSIONS.items() if head.startswith(start)), "")
+    if sheet is not None or head.startswith(WHOLE):
+        yield read_file(path, decimal=decimal, has_headers=has_headers, sheet=sheet)
+        return
+    above = b""
+    lines = 0
+    try:
+        with path.open("rb") as file, _unpacked(name, file) as stream:
+            for data in _pieces(stream):
+                text = text_of(path, data, "text")
+                table = read_text(path, above + text, decimal=decimal, has_headers=has_headers)
+                if above:
+                    table = _below(table, lines - above.count(NEWLINE))
+                else:
+                    above = b"".join(text.splitlines(keepends=True)[: int(table.lines[0])])
+                lines += text.count(NEWLINE)
+                yield table
+    except (EOFError, OSError, lzma.LZMAError) as error:
+        raise FileError(f"{path}: cannot be read: {error}") from None
+
+
+def _unpacked(compression: str, file: IO[bytes]) -> Any:
+    """The text of a file, which may be compressed."""
+    return COMPRESSIONS[compression][1](file) if compression else nullcontext(file)
+
+
+def _pieces(stream: IO[bytes]) -> Iterator[bytes]:
+    """Whole lines of about the size of a block."""
+    rest = b""
+    while data := stream.read(BLOCK):
+        end = data.rfind(NEWLINE) + 1
+        if not end:
+            rest += data
+            continue
+        yield rest + data[:end]
+        rest = data[end:]
+    if rest.strip():
+        yield rest
+
+
+def _below(table: Table, shift: int) -> Table:
+    """A table without its first row, that of the first block, and with the lines of the file."""
+
+    def moved(cells: list[BadCell]) -> list[BadCell]:
+        return [one._replace(line=one.line + shift) for one in cells]
+
+    return replace(
+        table,
+        values=table.values[:, 1:],
+        lines=table.lines[1:] + shift,
+        bad={column: moved(cells) for column, cells in table.bad.items()},
+        notes=[],
+    )

@@ -1,0 +1,153 @@
+"""Files as instruments write them: each is a small made one in the form of its instrument."""
+
+from __future__ import annotations
+
+import h5py
+import mesoslip
+import netCDF4
+import numpy as np
+import pytest
+from scipy.io import savemat
+
+TIME = np.arange(12) * 0.5
+FORCE = 1.5 + 0.25 * (np.arange(12) % 3)
+X = 0.01 * np.arange(12)
+# Forces [N] at the times of the record, and the normal force [N].
+LOAD = 20.0
+
+
+def rows(*columns, form="{:.4f}", between="\t", decimal="."):
+    """Lines of numbers."""
+    lines = (between.join(form.format(one) for one in row) for row in zip(*columns, strict=True))
+    text = "\n".join(lines) + "\n"
+    return text.replace(".", decimal)
+
+
+LABVIEW = (
+    "LabVIEW Measurement\t\nWriter_Version\t2\nReader_Version\t2\nSeparator\tTab\n"
+    "Decimal_Separator\t.\nMulti_Headings\tNo\nX_Columns\tOne\nTime_Pref\tAbsolute\n"
+    "Date\t2024/05/01\nTime\t12:00:00.1\n***End_of_Header***\t\n\nChannels\t1\t\nSamples\t12\t\n"
+    "Date\t2024/05/01\t\nX_Dimension\tTime\t\nX0\t0.0\t\nDelta_X\t0.5\t\n***End_of_Header***\t\n"
+    "X_Value\tForce (N)\tComment\n" + rows(TIME, FORCE).replace("\n", "\t\n")
+)
+TEKTRONIX = (
+    "Model,MSO44\nFirmware Version,1.30\n\nWaveform Type,ANALOG\nHorizontal Units,s\n"
+    "Sample Interval,0.5\nRecord Length,12\n\n\nTIME,CH1\n"
+    + rows(TIME, FORCE, between=",", form="{:.5e}")
+)
+PICOSCOPE = "Time,Channel A\n(ms),(mV)\n\n" + rows(1e3 * TIME, 1e3 * FORCE, between=",")
+KEYSIGHT = "x-axis,1\nsecond,Volt\n" + rows(TIME, FORCE, between=",", form="{:.6E}")
+BLUEHILL = (
+    '"Results Table 1"\n"","Friction"\n"","(N)"\n\n"Time","Extension","Load"\n'
+    '"(s)","(mm)","(N)"\n' + "".join(
+        f'"{a:.4f}","{b:.4f}","{c:.4f}"\n' for a, b, c in zip(TIME, X, FORCE, strict=True)
+    )
+)  # fmt: skip
+TESTXPERT = "Prüfzeit;Standardweg;Reibkraft\ns;mm;N\n" + rows(
+    TIME, X, FORCE, between=";", decimal=","
+)
+CATMAN = (
+    "HBM_CATMAN_DATAFILE_40\t\nT0 =\t01.05.2024 12:00:00\nTime  1 - default sample rate [s]\t"
+    "Friction force [N]\n" + rows(TIME, FORCE)
+)
+TRIBOMETER = (
+    "Data file\tA.TSV\nConfiguration file\tA.CFG\n\nTest started at 16:10:03 on 2019-04-08\n"
+    "Time\tTest Time\tLoad (N)\tFriction Force (N)\tFriction Coefficient\n"
+    + "".join(
+        f"16:10:{int(t):02d}\t{t:.1f}\t{LOAD}\t{f:.4f}\t{f / LOAD:.5f}\n".replace(".", ",")
+        for t, f in zip(TIME, FORCE, strict=True)
+    )
+    + "Test completed at 16:20:17 on 2019-04-08\n"
+)
+UMT = "T[s],Fx[N],Fz[N],Z[mm],COF\n" + rows(TIME, FORCE, LOAD + 0 * X, X, FORCE / LOAD, between=",")
+TRACTION = (
+    "PCS Instruments\nProfile\tStribeck\n\nStep time (s)\tRolling Speed (mm/s)\t"
+    "Traction force (N)\tBall load (N)\tTraction coeff (-)\n"
+    + rows(TIME, 100 + X, FORCE, LOAD + 0 * X, FORCE / LOAD)
+)
+ROCK = "Time(s)\tDispl(microns)\tShear_stress(MPa)\tNormal_stress(MPa)\n" + rows(
+    TIME, 1e3 * X, FORCE, LOAD + 0 * X
+)
+MTS = (
+    "MTS793|BTW|ENU|1|2|.|:|1|0|0|A\n\nData Acquisition: Timed\nStation Name: Shear.cfg\n\n"
+    "Time\tShear Displacement\tShear Force\tNormal Force\nSec\tmm\tkN\tkN\n"
+    + rows(TIME, X, 1e-3 * FORCE, 1e-3 * LOAD + 0 * X, form="{:.7f}")
+)
+TEXTS = {
+    "LabVIEW (.lvm)": (LABVIEW, {}),
+    "oscilloscope of Tektronix": (TEKTRONIX, {"columns": "time [s], force [N]"}),
+    "PicoScope": (PICOSCOPE, {"columns": "time [ms], force [mN]"}),
+    "oscilloscope of Keysight": (KEYSIGHT, {"columns": "time [s], force [N]"}),
+    "Instron Bluehill": (BLUEHILL, {}),
+    "Zwick testXpert": (TESTXPERT, {}),
+    "HBM catman": (CATMAN, {}),
+    "pin on disc (decimal commas, preamble)": (TRIBOMETER, {}),
+    "Bruker UMT": (UMT, {}),
+    "PCS traction machine": (TRACTION, {}),
+    "double direct shear (BRAVA)": (ROCK, {"area": "1 mm^2"}),
+    "MTS TestSuite": (MTS, {}),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", TEXTS)
+def test_texts_of_instruments(name, tmp_path):
+    """Forces and times as they were made, with the options that the page names."""
+    text, options = TEXTS[name]
+    path = tmp_path / "a.txt"
+    path.write_text(text, encoding="utf-8")
+    check(mesoslip.read_trace(path, **options))
+
+
+def check(tree):
+    name = "spring_force" if "spring_force" in tree else "friction_coefficient"
+    scale = 1.0 if name == "spring_force" else LOAD
+    assert scale * tree[name].values[0] == pytest.approx(FORCE, rel=1e-3)
+    assert np.diff(tree["time"].values) == pytest.approx(np.full(11, 0.5), rel=1e-6)
+
+
+def hdf5(path):
+    with h5py.File(path, "w") as file:
+        for name, unit, values in (("time", "s", TIME), ("force", "mN", 1e3 * FORCE)):
+            file[f"measurement/{name}"] = values
+            file[f"measurement/{name}"].attrs["units"] = unit
+
+
+def netcdf(path):
+    with netCDF4.Dataset(path, "w") as file:
+        file.createDimension("time", 12)
+        for name, unit, values in (("time", "s", TIME), ("force", "N", FORCE)):
+            one = file.createVariable(name, "f8", ("time",))
+            one.units = unit
+            one[:] = values
+
+
+def workbook(path):
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    for row in [("time [s]", "force [N]"), *zip(TIME.tolist(), FORCE.tolist(), strict=True)]:
+        book.active.append(row)
+    book.save(path)
+
+
+def tdms(path):
+    nptdms = pytest.importorskip("nptdms")
+    with nptdms.TdmsWriter(path) as file:
+        times = {"wf_increment": 0.5, "wf_start_offset": 0.0, "unit_string": "N"}
+        file.write_segment([nptdms.ChannelObject("rig", "Friction force", FORCE, times)])
+
+
+BINARIES = {
+    "LabVIEW (.tdms)": ("a.tdms", tdms),
+    "Excel": ("a.xlsx", workbook),
+    "HDF5": ("a.h5", hdf5),
+    "netCDF": ("a.nc", netcdf),
+    "MATLAB": ("a.mat", lambda path: savemat(path, {"time_s": TIME, "force_N": FORCE})),
+    "NumPy": ("a.npz", lambda path: np.savez(path, time_s=TIME, force_N=FORCE)),
+}
+
+
+@pytest.mark.parametrize("name", BINARIES)
+def test_binary_files(name, tmp_path):
+    file, write = BINARIES[name]
+    write(tmp_path / file)
+    check(mesoslip.read_trace(tmp_path / file))

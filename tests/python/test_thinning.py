@@ -1,0 +1,92 @@
+"""Records that are thinned on reading, block by block."""
+
+from __future__ import annotations
+
+import gzip
+
+import mesoslip
+import numpy as np
+import pytest
+from mesoslip.errors import FileError
+from mesoslip.measured.reading import blocks
+
+RATE, COUNT = 1000.0, 30000
+TIME = np.arange(COUNT) / RATE
+
+
+def written(path, force, time=TIME):
+    lines = [f"{one:.6f},{two:.6f}" for one, two in zip(time, force, strict=True)]
+    text = "\n".join(["time [s],force [N]", *lines]) + "\n"
+    path.write_bytes(gzip.compress(text.encode()) if path.suffix == ".gz" else text.encode())
+    return path
+
+
+@pytest.fixture
+def small_blocks(monkeypatch):
+    monkeypatch.setattr(blocks, "BLOCK", 2**16)
+
+
+def amplitude(tree, frequency):
+    """Amplitude of a sine in a record, away from its ends."""
+    time, force = tree["time"].values, tree["spring_force"].values[0]
+    inside = (time > 3) & (time < 27)
+    phase = 2 * np.pi * frequency * time[inside]
+    design = np.stack([np.cos(phase), np.sin(phase), np.ones(phase.size)], axis=1)
+    fit = np.linalg.lstsq(design, force[inside], rcond=None)[0]
+    return float(np.hypot(*fit[:2]))
+
+
+@pytest.mark.usefixtures("small_blocks")
+@pytest.mark.parametrize("name", ["a.csv", "a.csv.gz"])
+def test_slow_signals_stay_and_fast_ones_do_not_alias(name, tmp_path):
+    """Up to a quarter of the new rate nothing changes; a tone above half of it would be folded."""
+    force = 5 + np.sin(2 * np.pi * 2.0 * TIME) + np.sin(2 * np.pi * 18.0 * TIME)
+    tree = mesoslip.read_trace(written(tmp_path / name, force), rate="20 Hz")
+    assert np.diff(tree["time"].values) == pytest.approx(np.full(599, 0.05), rel=1e-6)
+    assert amplitude(tree, 2.0) == pytest.approx(1.0, abs=2e-3)
+    # 18 Hz at 20 Hz would look like 2 Hz: without it, the record is the slow sine alone.
+    slow = 5 + np.sin(2 * np.pi * 2.0 * tree["time"].values)
+    assert tree["spring_force"].values[0][50:-50] == pytest.approx(slow[50:-50], abs=2e-3)
+    assert "thinned: every 50th of 30000 lines, 20 Hz" in tree.attrs["understood"]
+
+
+def test_blocks_make_no_difference(monkeypatch, tmp_path):
+    """The same from one block and from many; lines of errors are those of the file."""
+    path = written(tmp_path / "a.csv", 5 + np.random.default_rng(1).standard_normal(COUNT))
+    whole = mesoslip.read_trace(path, rate="20 Hz")["spring_force"].values
+    monkeypatch.setattr(blocks, "BLOCK", 40000)
+    assert np.array_equal(mesoslip.read_trace(path, rate="20 Hz")["spring_force"].values, whole)
+    lines = path.read_text().splitlines()
+    lines[20000] = "19.999,hello"
+    path.write_text("\n".join(lines))
+    with pytest.raises(FileError, match=r"line 20001.*'hello', is not a number"):
+        mesoslip.read_trace(path, rate="20 Hz")
+
+
+@pytest.mark.usefixtures("small_blocks")
+def test_gaps_and_missing_numbers_stay(tmp_path):
+    """A gap is not filled in; a few missing samples do not spread."""
+    force = 5 + 0 * TIME
+    force[10000:10003] = np.nan
+    kept = (TIME < 12) | (TIME > 17)
+    tree = mesoslip.read_trace(
+        written(tmp_path / "a.csv", force[kept], TIME[kept]), rate="20 Hz", noise="0.1 N"
+    )
+    time = tree["time"].values
+    assert not ((time > 12.01) & (time < 16.99)).any()
+    assert time.size == pytest.approx(500, abs=2)
+    assert tree["spring_force"].values == pytest.approx(5.0)
+
+
+def test_what_cannot_be_thinned(tmp_path):
+    """Uneven times are refused, and a rate above that of the file changes nothing."""
+    rng = np.random.default_rng(1)
+    uneven = np.cumsum(rng.exponential(1e-3, COUNT))
+    with pytest.raises(FileError, match="the times are uneven"):
+        mesoslip.read_trace(
+            written(tmp_path / "a.csv", 1 + rng.random(COUNT), uneven), rate="20 Hz"
+        )
+    path = written(tmp_path / "b.csv", 1 + rng.random(COUNT))
+    tree = mesoslip.read_trace(path, rate="900 Hz")
+    assert tree.sizes["time"] == COUNT
+    assert "not thinned: recorded at 1000 Hz" in tree.attrs["understood"]

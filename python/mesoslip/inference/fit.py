@@ -90,6 +90,7 @@ def fit(
 ) -> FitResult:
     """Fit parameters to outputs with a trace each; see `mesoslip.fit`."""
     check_installed()
+    plan = plan.of_traces(len(trees))
     simulator = prepare(trees, names, plan)
     observed, left_out = usable_summaries(simulator)
     used = np.where(left_out, np.nan, observed)
@@ -130,6 +131,7 @@ def fit(
 
 def prepare(trees: Sequence[xr.DataTree], names: Sequence[str], plan: Plan) -> Simulator:
     """The simulator of experiments, with their traces."""
+    plan = plan.of_traces(len(trees))
     several = len(trees) > 1
     experiments = [
         prepare_experiment(tree, plan, name if several else "", number)
@@ -144,7 +146,9 @@ def prepare(trees: Sequence[xr.DataTree], names: Sequence[str], plan: Plan) -> S
             replace(one, wander_length=length, apparatus=apparatus)
             for one, apparatus in zip(experiments, own, strict=True)
         ]
-    return Simulator(tuple(experiments), plan.prior, plan.seed, plan.coarse_count)
+    return Simulator(
+        tuple(experiments), plan.prior, plan.seed, plan.coarse_count, plan.shares_track
+    )
 
 
 def usable_summaries(simulator: Simulator) -> tuple[Array, NDArray[np.bool_]]:

@@ -314,6 +314,16 @@ def test_wrong_keys_of_records_are_named(change, message):
         Plan.from_dict(fit_tables(**change))
 
 
+def test_free_keys_are_removed_by_changes(tmp_path):
+    path = tmp_path / "fit.toml"
+    import tomli_w
+
+    path.write_text(tomli_w.dumps(fit_tables()))
+    assert Plan.load(path).prior.keys == tuple(FREE)
+    plan = Plan.load(path, ["fit.free.contacts.delay=none", "fit.level=true"])
+    assert plan.of_traces(1).prior.keys == ("contacts.static_force", LEVEL)
+
+
 def test_traces_may_share_their_track():
     tables = fit_tables(shared_track=True)
     tables["contacts"]["track"] = {"spread": 0.2, "length": 2e-8}

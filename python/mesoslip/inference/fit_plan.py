@@ -11,7 +11,14 @@ from pathlib import Path
 from typing import Any
 
 from mesoslip.configuration.config import Config
-from mesoslip.configuration.files import Change, on_base, override, read_toml
+from mesoslip.configuration.files import (
+    Change,
+    Merged,
+    on_base,
+    override,
+    read_toml,
+    undotted,
+)
 from mesoslip.configuration.keys import key_kind, nearest_keys
 from mesoslip.configuration.units import to_si
 from mesoslip.errors import ConfigError, Problem
@@ -94,7 +101,7 @@ class Plan:
         """
         path = Path(path)
         merged = read_toml(path)
-        tables = override(merged, overrides).tables
+        tables = override(_nested(merged), overrides).tables
         return cls._checked(tables, str(path), known, merged.base)
 
     @classmethod
@@ -184,6 +191,15 @@ class Plan:
         if "contacts.count" in self.prior.keys or self.config.contact_kind.on_lattice:
             return None
         return self.simulated_contacts if contacts.count >= 2 * self.simulated_contacts else None
+
+
+def _nested(merged: Merged) -> Merged:
+    """Tables with free keys as nested ones, as changes of them are."""
+    table = merged.tables.get("fit")
+    if not isinstance(table, Mapping) or not isinstance(table.get("free"), Mapping):
+        return merged
+    free = undotted(table["free"])
+    return replace(merged, tables={**merged.tables, "fit": {**table, "free": free}})
 
 
 def _place(tables: dict[str, Any], one: FreeParameter) -> None:

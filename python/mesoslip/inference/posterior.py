@@ -226,6 +226,12 @@ def _notes(fitted: FitResult) -> Iterator[str]:
                 f"{name} of {titles[one.trace]}" for name, one in zip(named, features, strict=True)
             ]
         yield f"left out, as noise dominates: {', '.join(dict.fromkeys(named))}"
+    if needed := fitted.estimate.surrogate.simulations_for_products:
+        yield (
+            f"the likelihood is learnt from {len(fitted.estimate.parameters)} simulations near the "
+            f"posterior, without products of parameters, for which it needs {needed}: intervals "
+            "are wider than the traces allow (fit.simulations)"
+        )
     if fitted.plan.level_width:
         what = {"contacts": "the forces of all contacts", "record": "the recorded force"}
         yield (

@@ -224,6 +224,8 @@ def test_a_simulation_runs_in_over_a_distance():
     slow = run_in_samples(on_track, 0.0, 1e-3, 10**9)
     fast = run_in_samples(on_track.replace({"drive.velocity": 1e-6}), 0.0, 1e-3, 10**9)
     assert slow == pytest.approx(10 * fast, abs=10)
+    rushed = run_in_samples(on_track.replace({"drive.velocity": 1.0}), 0.0, 1e-3, 10**9)
+    assert rushed == pytest.approx(5 * 2e3 * config.slider.quiet_time, abs=1)
     assert run_in_samples(on_track, 0.0, 1e-3, 7) == 7
 
 

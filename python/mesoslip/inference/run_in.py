@@ -16,6 +16,8 @@ from mesoslip.configuration.config import Config
 LOADINGS, STEADY_LOADINGS = 1.5, 0.5
 STRETCHES = 10.0
 TRACK_LENGTHS = 1.0
+# Minimum time in periods of the setup, for a drive so fast that the slider still rings.
+PERIODS = 5
 
 
 def run_in_distance(config: Config, force: float) -> float:
@@ -31,9 +33,12 @@ def run_in_distance(config: Config, force: float) -> float:
 
 
 def run_in_samples(config: Config, force: float, interval: float, count: int) -> int:
-    """That distance in samples of an interval [s], at most as many as the trace has."""
+    """That distance in samples of an interval [s], and at least some periods of the setup.
+
+    It is at most as long as the trace.
+    """
     velocity = abs(first_velocity(config) or 0.0)
     if not velocity > 0:
         return count
-    wanted = run_in_distance(config, force) / velocity / interval
-    return min(count, math.ceil(wanted))
+    wanted = max(run_in_distance(config, force) / velocity, PERIODS * 2 * config.slider.quiet_time)
+    return min(count, math.ceil(wanted / interval))

@@ -53,7 +53,7 @@ def few_simulations():
         patch.setattr(rounds, "MIN_NEXT", 30)
         patch.setattr(sampler, "BURN_IN", 60)
         patch.setattr(sampler, "THIN", 4)
-        patch.setattr("mesoslip.inference.fit.PREDICTIONS", 60)
+        patch.setattr("mesoslip.inference.fit_plan.PREDICTIONS", 60)
         yield
 
 

@@ -29,9 +29,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-# Number of predicted traces, and a smaller one if most simulations have fewer contacts than these.
-PREDICTIONS = 160
-FEW_PREDICTIONS = 100
 # Maximum number of stored samples of a predicted trace.
 MAX_SAMPLES = 3000
 # Number of traces with additional noise.
@@ -95,7 +92,7 @@ def fit(
     observed, left_out = usable_summaries(simulator)
     used = np.where(left_out, np.nan, observed)
     rng = np.random.default_rng(plan.seed)
-    count = FEW_PREDICTIONS if simulator.coarse_count else PREDICTIONS
+    count = plan.prediction_count
     with ExitStack() as stack:
         kept = None
         if store is not None:

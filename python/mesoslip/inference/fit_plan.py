@@ -33,7 +33,7 @@ from mesoslip.inference.prior import (
 )
 
 KEYS = (
-    *("free", "noise", "after", "simulations", "seed", "simulated_contacts"),
+    *("free", "noise", "after", "simulations", "predictions", "seed", "simulated_contacts"),
     *("wander", "level", "filter", "shared_track"),
 )
 RANGE_KEYS = ("from", "to", "prior")
@@ -47,6 +47,9 @@ LEVEL_WIDTH, MAX_LEVEL_WIDTH = 0.2, 1.0
 NOT_FITTED = ("run.", "output.", "curve.")
 PRIORS = ("uniform", "logarithmic")
 MIN_SIMULATIONS = 300
+# Number of predicted traces of a fit, a smaller one if most simulations have fewer contacts than
+# these, and minimum: fewer cannot reject a model.
+PREDICTIONS, FEW_PREDICTIONS, MIN_PREDICTIONS = 160, 100, 50
 MIN_CONTACTS = 100
 # Kinds of sliders with a mass, and with a spring.
 HAS_MASS = ("rigid", "layered")
@@ -85,6 +88,8 @@ class Plan:
     """What a level multiplies, one of `LEVELS`."""
     filter_time: float = 0.0
     """Time constant of the load cell [s], if it is known; 0 without a filter."""
+    predictions: int | None = None
+    """Number of predicted traces, if it is given."""
     shares_track: bool = False
     """Whether all traces have the same track, from its start on."""
 
@@ -170,6 +175,11 @@ class Plan:
             level_width=level_width,
             level_of=level_of,
             filter_time=filter_time,
+            predictions=(
+                reader.whole(table, "predictions", PREDICTIONS, MIN_PREDICTIONS)
+                if "predictions" in table
+                else None
+            ),
             shares_track=shares_track,
         )
         if reader.problems:
@@ -183,6 +193,11 @@ class Plan:
             names = [level_name(number, count) for number in range(count)]
             free += tuple(level_parameter(self.level_width, one) for one in names)
         return replace(self, prior=Prior(free), has_several=count > 1)
+
+    @property
+    def prediction_count(self) -> int:
+        """Number of predicted traces."""
+        return self.predictions or (FEW_PREDICTIONS if self.coarse_count else PREDICTIONS)
 
     @property
     def coarse_count(self) -> int | None:

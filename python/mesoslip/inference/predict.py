@@ -19,7 +19,7 @@ from mesoslip.execution.stop import StopRequest
 from mesoslip.inference.apparatus import of_predicted, predicted_sentences
 from mesoslip.inference.checks import compare
 from mesoslip.inference.fit import predict_traces, usable_summaries
-from mesoslip.inference.fit_plan import LEVELS, Plan
+from mesoslip.inference.fit_plan import LEVELS, MIN_PREDICTIONS, Plan
 from mesoslip.inference.posterior import summaries_group, trace_groups
 from mesoslip.inference.prior import LEVEL, WANDER, FreeParameter, Prior, level_parameter
 from mesoslip.inference.simulations import Simulations, Simulator
@@ -31,8 +31,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-# Number of predicted traces, and minimum: fewer cannot reject a model.
-PREDICTIONS, MIN_PREDICTIONS = 60, 50
+# Number of predicted traces.
+PREDICTIONS = 60
 # Maximum number of directions in which predictions are compared, and predictions for each.
 MAX_DIRECTIONS = 10
 PREDICTIONS_PER_DIRECTION = 12

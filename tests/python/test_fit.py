@@ -55,8 +55,7 @@ def few_simulations():
         patch.setattr(rounds, "MIN_NEXT", 30)
         patch.setattr(sampler, "BURN_IN", 60)
         patch.setattr(sampler, "THIN", 4)
-        patch.setattr("mesoslip.inference.fit.PREDICTIONS", 60)
-        patch.setattr("mesoslip.inference.predict.PREDICTIONS", 60)
+        patch.setattr("mesoslip.inference.fit_plan.PREDICTIONS", 60)
         yield
 
 
@@ -98,6 +97,16 @@ class Linear:
     def add(self, points):
         self.parameters = np.concatenate([self.parameters, points])
         self.summaries = np.concatenate([self.summaries, self.simulate(points)])
+
+
+def test_products_of_parameters_need_simulations():
+    """The number that is stated is that from which on they are terms."""
+    rng = np.random.default_rng(1)
+    parameters = rng.random((200, 5))
+    made = [likelihood.learn(parameters[:n], parameters[:n], parameters[:n]) for n in (167, 168)]
+    assert [one.simulations_for_products for one in made] == [168, 0]
+    alone = likelihood.learn(parameters[:20, :1], parameters[:20, :1], parameters[:20, :1])
+    assert alone.simulations_for_products == 0
 
 
 def linear_problem(seed, total=400):

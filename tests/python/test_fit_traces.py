@@ -10,16 +10,21 @@ import numpy as np
 import pytest
 import xarray as xr
 from conftest import klein_tables
+from mesoslip.configuration.config import Config
 from mesoslip.errors import ConfigError, FileError
 from mesoslip.execution.stop import Stop
-from mesoslip.inference import apparatus, checks, likelihood
+from mesoslip.inference import apparatus, checks, likelihood, run_in
 from mesoslip.inference.features import Feature
 from mesoslip.inference.fit import prepare as prepare_all
 from mesoslip.inference.fit import usable_summaries
 from mesoslip.inference.fit_plan import Plan
 from mesoslip.inference.fit_trace import as_plan
+from mesoslip.inference.instrument import Instrument, low_pass
 from mesoslip.inference.misfit import sentence
 from mesoslip.inference.noise import Noise, cleaned
+from mesoslip.inference.predict import _with_own_level
+from mesoslip.inference.prior import FILTER, LEVEL
+from mesoslip.inference.run_in import run_in_distance, run_in_samples
 from mesoslip.inference.simulations import Simulations
 from mesoslip.inference.traced_experiment import Sampling, prepare
 from mesoslip.inference.wander import wandering
@@ -150,7 +155,7 @@ def test_a_misfit_is_described_by_what_is_seen(change, words):
     points = np.tile(plan.prior.unit(np.array(list(TRUTH.values()))), (60, 1))
     made = Simulations(simulator, expected=60, executor=1)
     made.add(points)
-    found = checks.compare(simulator.features, made.summaries, made.summaries, simulator.observed)
+    found = checks.compare(simulator.features, None, made.summaries, simulator.observed)
     assert found.is_rejected
     assert any(words in one for one in found.sentences)
     assert any("N, measured" in one for one in found.sentences)
@@ -195,12 +200,165 @@ def test_a_trace_from_the_middle_of_an_experiment():
     later = xr.DataTree(tree.to_dataset().isel(time=slice(900, None)))
     one = prepare(later, Plan.from_dict(fit_tables()))
     assert not one.summarizer.has_start
-    assert one.sampling.lead > 0
+    assert one.needs_run_in
+    assert one.run_in > 0
     plan = Plan.from_dict(fit_tables())
     simulator = prepare_all([later], ["a"], plan)
     force = simulator.forces((1, plan.prior.unit(np.array(list(TRUTH.values()))), False), Stop())
     assert len(force[0]) == len(one.force)
     assert np.abs(force[0][0]) > 20 * NOISE
+
+
+def test_a_simulation_runs_in_over_a_distance():
+    """The loading, some breaking stretches and the track, at any velocity of the drive."""
+    config = Config.from_dict(klein_tables(**SMALL))
+    stretch = config.contacts.break_stretch
+    track = {"contacts.track": {"spread": 0.1, "length": 5 * stretch}}
+    on_track = config.replace(track)
+    assert run_in_distance(on_track, 0.0) - run_in_distance(config, 0.0) == pytest.approx(
+        run_in.TRACK_LENGTHS * 5 * stretch
+    )
+    loaded = run_in_distance(config, 2 * config.contacts.static_force)
+    more = run_in.LOADINGS * config.contacts.static_force / config.spring_stiffness
+    assert loaded - run_in_distance(config, 0.0) == pytest.approx(more)
+    slow = run_in_samples(on_track, 0.0, 1e-3, 10**9)
+    fast = run_in_samples(on_track.replace({"drive.velocity": 1e-6}), 0.0, 1e-3, 10**9)
+    assert slow == pytest.approx(10 * fast, abs=10)
+    rushed = run_in_samples(on_track.replace({"drive.velocity": 1.0}), 0.0, 1e-3, 10**9)
+    assert rushed == pytest.approx(5 * 2e3 * config.slider.quiet_time, abs=1)
+    assert run_in_samples(on_track, 0.0, 1e-3, 7) == 7
+
+
+def test_a_trace_is_used_from_a_displacement_on():
+    """The same of each trace, whatever its velocity."""
+    tables = fit_tables(after="50 nm")
+    one = prepare(experiment(), Plan.from_dict(tables))
+    assert one.sampling.start == pytest.approx(0.5)
+    fast = experiment(drive__velocity=2e-7)
+    tables["drive"] = {"velocity": 2e-7}
+    assert prepare(fast, Plan.from_dict(tables)).sampling.start == pytest.approx(0.25)
+    with pytest.raises(ConfigError, match=r"fit\.after.*must not be negative"):
+        Plan.from_dict(fit_tables(after="-50 nm"))
+
+
+def test_a_load_cell_filters_exactly():
+    """A ramp lags by the time constant, and a slow sine is weaker by (1 + (omega tau)^2)^1/2."""
+    step = 0.3
+    time = step * np.arange(4000)
+    np.testing.assert_allclose(low_pass(time, step), time - 1 + np.exp(-time), atol=1e-12)
+    omega = 0.05
+    filtered = low_pass(np.sin(omega * time), step)[2000:]
+    assert np.max(filtered) == pytest.approx(1 / math.hypot(1, omega), rel=1e-4)
+    np.testing.assert_array_equal(low_pass(np.full(9, 3.0), 0.01), np.full(9, 3.0))
+
+
+def test_a_level_multiplies_the_forces():
+    """Those of all contacts, which a prescribed slider feels, or the record."""
+    config = Config.from_dict(klein_tables(**SMALL)).replace(
+        {
+            "slider.kind": "prescribed",
+            "run.duration": 0.5,
+            "contacts.drag": 0.1,
+            "contacts.drag_rate": 0,
+        }
+    )
+    force = mesoslip.run(config)["contact_force"].values
+    contacts = Instrument(LEVEL)
+    more = mesoslip.run(contacts.levelled(config, {LEVEL: 1.25}))["contact_force"].values
+    np.testing.assert_allclose(more, 1.25 * force, rtol=1e-9, atol=1e-15)
+    np.testing.assert_array_equal(contacts.read(force[0], 1e-3, {LEVEL: 1.25}), force[0])
+    record = Instrument(LEVEL, "record", filter_time=1e-6)
+    assert record.levelled(config, {LEVEL: 1.25}) is config
+    read = record.read(force[0], 1e-3, {LEVEL: 1.25})
+    np.testing.assert_allclose(read, 1.25 * force[0], rtol=2e-3)
+    free = record.read(force[0], 1e-3, {FILTER: 0.1})
+    assert np.std(np.diff(free)) < 0.1 * np.std(np.diff(force[0]))
+
+
+def test_levels_have_a_prior_of_their_own():
+    """One for each trace, normal in its logarithm; that of a predicted trace is unknown."""
+    plan = Plan.from_dict(fit_tables(level={"width": 0.1}, filter={"from": "0 s", "to": "1 ms"}))
+    two = plan.of_traces(2)
+    assert two.prior.keys[-3:] == ("fit.filter", "fit.level.1", "fit.level.2")
+    assert two.of_traces(2) is not None
+    assert two.of_traces(2).prior == two.prior
+    assert set(two.prior.changes(np.ones(5))) == set(FREE)
+    (level,) = [one for one in plan.of_traces(1).prior.free if one.key == LEVEL]
+    quantiles = np.linspace(0, 1, 10_001)
+    values = level.value(quantiles)
+    np.testing.assert_allclose(level.quantile(values), quantiles, atol=1e-12)
+    assert values[[0, -1]] == pytest.approx([level.low, level.high])
+    # A normal law that ends at three standard deviations has 0.9866 of its deviation.
+    assert np.std(np.log(values)) == pytest.approx(0.09866, rel=1e-3)
+    points = np.random.default_rng(1).random((4000, 5))
+    points[:, -2:] = 0.99
+    prior, own = _with_own_level(two.prior, points, np.random.default_rng(2))
+    assert prior.keys == ("fit.level.1", *FREE, "fit.filter")
+    assert np.std(np.log(prior.values(own)[:, 0])) == pytest.approx(0.0987, rel=0.05)
+    np.testing.assert_array_equal(own[:, 1:], points[:, :3])
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"level": {"width": 2}}, r"fit\.level\.width = 2: must be a number above 0, at most 1"),
+        ({"level": {"of": "spring"}}, r"fit\.level\.of.*must be 'contacts' or 'record'"),
+        ({"level": {"widht": 0.1}}, r"fit\.level\.widht: unknown key; did you mean 'width'"),
+        ({"level": 3}, r"fit\.level.*must be true or false"),
+        ({"filter": "-1 ms"}, r"fit\.filter.*must not be negative"),
+        ({"filter": {"from": "2 ms", "to": "1 ms"}}, r"fit\.filter\.to.*greater than 'from'"),
+        ({"filter": {"from": "-2 ms", "to": "1 ms"}}, r"fit\.filter\.from.*not be negative"),
+        ({"shared_track": True}, r"fit\.shared_track.*there is no \[contacts\.track\]"),
+    ],
+)
+def test_wrong_keys_of_records_are_named(change, message):
+    with pytest.raises(ConfigError, match=message):
+        Plan.from_dict(fit_tables(**change))
+
+
+def test_free_keys_are_removed_by_changes(tmp_path):
+    path = tmp_path / "fit.toml"
+    import tomli_w
+
+    path.write_text(tomli_w.dumps(fit_tables()))
+    assert Plan.load(path).prior.keys == tuple(FREE)
+    plan = Plan.load(path, ["fit.free.contacts.delay=none", "fit.level=true"])
+    assert plan.of_traces(1).prior.keys == ("contacts.static_force", LEVEL)
+
+
+def test_traces_may_share_their_track():
+    tables = fit_tables(shared_track=True)
+    tables["contacts"]["track"] = {"spread": 0.2, "length": 2e-8}
+    trees, piece = [experiment(), experiment()], (5, np.full(2, 0.5), False)
+    shared = prepare_all(trees, ["a", "b"], Plan.from_dict(tables))
+    one, other = shared.forces(piece, Stop())
+    assert 0 < np.max(np.abs(one - other)) < 12 * NOISE
+    tables["fit"]["shared_track"] = False
+    one, other = prepare_all(trees, ["a", "b"], Plan.from_dict(tables)).forces(piece, Stop())
+    assert np.max(np.abs(one - other)) > 50 * NOISE
+    tables["fit"]["shared_track"] = True
+    later = xr.DataTree(measured(experiment()).to_dataset().isel(time=slice(900, None)))
+    with pytest.raises(FileError, match="its place on the track is unknown"):
+        prepare_all([later], ["a"], Plan.from_dict(tables))
+
+
+def test_predictions_alone_reject_as_often_as_stated():
+    """The covariance of few predictions with many summaries, which the trace is no part of."""
+    rng = np.random.default_rng(3)
+    features = [Feature(f"{number}", "slips", "") for number in range(30)]
+    mixed = np.eye(30) + 0.3 * rng.standard_normal((30, 30))
+    found, wrong = np.array(
+        [
+            [
+                checks.compare(features, None, drawn[1:], observed).probability
+                for observed in (drawn[0], drawn[0] + 10 * mixed[0])
+            ]
+            for drawn in (rng.standard_normal((61, 30)) @ mixed for _ in range(100))
+        ]
+    ).T
+    assert np.mean(found < 0.02) <= 0.06
+    assert np.mean(found < 0.2) == pytest.approx(0.2, abs=0.1)
+    assert np.median(wrong) < 0.05
 
 
 def test_the_apparatus_comes_from_the_trace():

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from kinds import LOAD, VIBRATING, configuration
 from mesoslip import Config, ConfigError, Realization
+from mesoslip.analysis.response import write_csv
 from mesoslip.configuration.load import Load
 from scipy.interpolate import CubicSpline
 
@@ -366,6 +367,23 @@ def test_the_response_to_a_step_is_direct_or_transient(steps_up_and_down, relaxe
     rise = found["rise_displacement"].values
     assert relaxed(rise[0]) == pytest.approx(STEADY, abs=0.02)
     assert np.isnan(rise[1])
+
+
+def test_steps_of_the_load_are_in_the_table(steps_up_and_down, tmp_path):
+    """A row each after that of the stage, with all columns."""
+    path = tmp_path / "steps.csv"
+    response = mesoslip.response(steps_up_and_down, fit=False)
+    write_csv(response, path)
+    head, *rows = [line.split(",") for line in path.read_text().splitlines()]
+    names = [one.partition(" ")[0] for one in head]
+    assert len(rows) == 3
+    kept = [dict(zip(names, one, strict=True)) for one in rows]
+    assert float(kept[0]["steady_force"]) > 0
+    found = response["load_steps"].to_dataset()
+    for name in ("load_step_time", "direct_change", "transient_change", "alpha"):
+        assert kept[0][name] == ""
+        assert [float(one[name]) for one in kept[1:]] == pytest.approx(found[name].values)
+    assert [one["steady_force"] for one in kept[1:]] == ["", ""]
 
 
 def test_the_response_of_a_measured_trace_has_steps_of_its_normal_force(

@@ -10,7 +10,10 @@ study goes on from there:
 
 With `--noise laboratory` the noise is coloured and digitized, with impulses in 1 % of the samples,
 and estimated from the trace as that of a measurement. With `--contacts 4800 --simulated 800` the
-interface has more contacts than most simulations of its fit.
+interface has more contacts than most simulations of its fit. With `--case levels` an experiment is
+two records of contacts on tracks, with springs of 97 and 160 N/m and a level each:
+
+    python tests/studies/fit_calibration.py out/levels.csv --case levels --experiments 30
 """
 
 from __future__ import annotations
@@ -19,6 +22,7 @@ import argparse
 import csv
 import time
 from pathlib import Path
+from typing import Any
 
 import mesoslip
 import numpy as np
@@ -26,6 +30,7 @@ from mesoslip.errors import RunError
 from mesoslip.inference.fit import prepare, usable_summaries
 from mesoslip.inference.fit_plan import Plan
 from mesoslip.inference.noise import Noise
+from mesoslip.inference.prior import level_name
 from mesoslip.inference.rounds import estimate_posterior
 from mesoslip.inference.simulations import Simulations
 
@@ -53,6 +58,34 @@ TABLES = {
 }
 
 
+LEVELS = {
+    "base": str(ROOT / "runs" / "klein.toml"),
+    "run": {"duration": 3.3},
+    "drive": {"velocity": 1e-6},
+    "contacts": {"count": 100, "drag_rate": 0, "track": {"correlation": "exponential"}},
+    "output": {"interval": 2e-3},
+    "fit": {
+        "noise": NOISE,
+        "after": "300 nm",
+        "level": {"width": 0.1},
+        "simulations": 300,
+        "free": {
+            **{
+                key: TABLES["fit"]["free"][key]  # type: ignore[index,call-overload]
+                for key in ("contacts.static_force", "contacts.delay")
+            },
+            "contacts.track.spread": {"from": 0.02, "to": 0.3, "prior": "logarithmic"},
+            "contacts.track.length": {"from": 5e-8, "to": 2e-6, "prior": "logarithmic"},
+        },
+    },
+}
+# Tables of each case, and the springs of its records [N/m]; None is that of the tables.
+CASES: dict[str, tuple[dict[str, Any], tuple[float | None, ...]]] = {
+    "klein": (TABLES, (None,)),
+    "levels": (LEVELS, (97.0, 160.0)),
+}
+
+
 def laboratory(force: np.ndarray, interval: float, rng: np.random.Generator) -> np.ndarray:
     """A force as a laboratory records it: coloured noise, digital steps, and impulses."""
     noise = Noise(NOISE, coloured=NOISE, correlation_time=20e-3, step=NOISE)
@@ -63,24 +96,42 @@ def laboratory(force: np.ndarray, interval: float, rng: np.random.Generator) -> 
 
 def experiment(number: int, options: argparse.Namespace) -> dict[str, object]:
     """One experiment: ranks of the truth, by parameter, and what the fit took."""
-    tables = {**TABLES, "fit": {**TABLES["fit"], "seed": number}}  # type: ignore[dict-item]
-    tables["contacts"] = {"count": options.contacts}
+    case, springs = CASES[options.case]
+    tables = {**case, "fit": {**case["fit"], "seed": number}}
+    if options.contacts:
+        tables["contacts"] = {**case["contacts"], "count": options.contacts}
     tables["fit"]["simulated_contacts"] = options.simulated
     if options.noise == "laboratory":
         del tables["fit"]["noise"]
-    plan = Plan.from_dict(tables)
+    plan = Plan.from_dict(tables).of_traces(len(springs))
     rng = np.random.default_rng([2026, number])
     truth = rng.random(len(plan.prior))
-    changes = plan.prior.changes(plan.prior.values(truth))
-    tree = mesoslip.run(plan.config.replace({**changes, "run.seed": 10**6 + number}))
-    exact = tree["spring_force"]
-    if options.noise == "laboratory":
-        tree.attrs["origin"] = "measured"
-        tree["spring_force"] = exact.copy(data=[laboratory(exact.values[0], 2e-3, rng)])
-    else:
-        tree["spring_force"] = exact + NOISE * rng.standard_normal(exact.shape)
+    values = plan.prior.values(truth)
+    changes, levels = plan.prior.changes(values), plan.prior.nuisances(values)
+    trees = []
+    for place, spring in enumerate(springs):
+        config = plan.config.replace({**changes, "run.seed": 10**6 + number + 10**5 * place})
+        if spring is not None:
+            config = config.replace({"slider.stiffness": spring})
+        level = levels.get(level_name(place, len(springs)), 1.0)
+        contacts = config.contacts
+        tree = mesoslip.run(
+            config.replace(
+                {
+                    "contacts.static_force": level * contacts.static_force,
+                    "contacts.stiffness": level * contacts.stiffness,
+                }
+            )
+        )
+        exact = tree["spring_force"]
+        if options.noise == "laboratory":
+            tree.attrs["origin"] = "measured"
+            tree["spring_force"] = exact.copy(data=[laboratory(exact.values[0], 2e-3, rng)])
+        else:
+            tree["spring_force"] = exact + NOISE * rng.standard_normal(exact.shape)
+        trees.append(tree)
     start = time.process_time()
-    simulator = prepare([tree], [""], plan)
+    simulator = prepare(trees, [str(one) for one in range(len(trees))], plan)
     observed, left_out = usable_summaries(simulator)
     observed[left_out] = np.nan
     made = Simulations(simulator, expected=plan.simulations, executor=options.workers)
@@ -100,8 +151,13 @@ def experiment(number: int, options: argparse.Namespace) -> dict[str, object]:
     return row
 
 
-def fields() -> list[str]:
-    keys = list(TABLES["fit"]["free"])  # type: ignore[index,call-overload]
+def keys_of(case: str) -> tuple[str, ...]:
+    """The parameters of a case."""
+    tables, springs = CASES[case]
+    return Plan.from_dict(tables).of_traces(len(springs)).prior.keys
+
+
+def fields(keys: tuple[str, ...]) -> list[str]:
     columns = [f"{what} {key}" for key in keys for what in ("rank", "truth", "deviation")]
     return ["experiment", "status", *columns, "seconds"]
 
@@ -118,14 +174,13 @@ def coverage(ranks: np.ndarray, part: float) -> float:
     return float(np.mean(np.abs(ranks - 0.5) <= part / 2))
 
 
-def report(rows: list[dict[str, str]], picture: Path | None) -> None:
+def report(rows: list[dict[str, str]], keys: tuple[str, ...], picture: Path | None) -> None:
     """Tell, and draw, how uniform the ranks are."""
     from matplotlib.figure import Figure
     from scipy.stats import binom, kstest
 
     fitted = [row for row in rows if row["status"] == "fitted"]
     print(f"{len(rows)} experiments, {len(fitted)} fitted")
-    keys = list(TABLES["fit"]["free"])  # type: ignore[index,call-overload]
     figure = Figure(figsize=(6.5, 1.9 * ((len(keys) + 1) // 2)), layout="constrained", dpi=200)
     axes = figure.subplots((len(keys) + 1) // 2, 2).ravel()
     for key, panel in zip(keys, axes, strict=False):
@@ -156,23 +211,24 @@ def main() -> None:
     parser.add_argument("--report", type=Path, default=None, metavar="PICTURE")
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--noise", choices=("white", "laboratory"), default="white")
-    parser.add_argument("--contacts", type=int, default=800)
+    parser.add_argument("--case", choices=tuple(CASES), default="klein")
+    parser.add_argument("--contacts", type=int, default=None)
     parser.add_argument("--simulated", type=int, default=2000, metavar="CONTACTS")
     options = parser.parse_args()
-    done = read(options.table)
+    done, keys = read(options.table), keys_of(options.case)
     numbers = {int(row["experiment"]) for row in done}
     if not done:
         options.table.parent.mkdir(parents=True, exist_ok=True)
         with options.table.open("w", newline="") as file:
-            csv.DictWriter(file, fields()).writeheader()
+            csv.DictWriter(file, fields(keys)).writeheader()
     for number in range(options.experiments):
         if number in numbers:
             continue
         row = experiment(number, options)
         with options.table.open("a", newline="") as file:
-            csv.DictWriter(file, fields()).writerow(row)
+            csv.DictWriter(file, fields(keys)).writerow(row)
         print(row["experiment"], row["status"], row.get("seconds"), flush=True)
-    report(read(options.table), options.report)
+    report(read(options.table), keys, options.report)
 
 
 if __name__ == "__main__":

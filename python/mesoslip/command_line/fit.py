@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 
     from mesoslip.inference.posterior import Row
 
-
 HEAD = (
     *("parameter", "median", "50 % interval", "90 % interval", "unit"),
     *("verdict", "shrinkage", "follows from"),
@@ -59,6 +58,12 @@ def fit(
         bool,
         typer.Option("--compare", help="Compare fits of the same traces by their predictions"),
     ] = False,
+    predictions: Annotated[
+        int | None,
+        typer.Option(
+            help="Number of traces with --predict, at least 50; 60 by default", metavar="NUMBER"
+        ),
+    ] = None,
     workers: Annotated[int | None, workers_option("simulations")] = None,
     quiet: QuietOption = False,
     as_json: JsonOption = False,
@@ -75,7 +80,7 @@ def fit(
     *traces, config = outputs
     if predict is not None and config.suffix == ".nc" and not traces:
         target = posterior or config.with_name(f"{config.stem}.{predict.stem}.nc")
-        _predict(config, predict, target, workers, quiet=quiet, as_json=as_json)
+        _predict(config, predict, target, predictions, workers, quiet=quiet, as_json=as_json)
         return
     check_arguments(traces, config, predict)
     path = posterior or Path("out") / f"{traces[0].stem}.posterior.nc"
@@ -83,7 +88,7 @@ def fit(
     _print(tree, as_json=as_json and predict is None)
     if predict is not None:
         target = path.with_name(f"{path.stem}.{predict.stem}.nc")
-        _predict(path, predict, target, workers, quiet=quiet, as_json=as_json)
+        _predict(path, predict, target, predictions, workers, quiet=quiet, as_json=as_json)
 
 
 def _fitted(
@@ -120,7 +125,14 @@ def _fitted(
 
 
 def _predict(
-    posterior: Path, trace: Path, path: Path, workers: int | None, *, quiet: bool, as_json: bool
+    posterior: Path,
+    trace: Path,
+    path: Path,
+    predictions: int | None,
+    workers: int | None,
+    *,
+    quiet: bool,
+    as_json: bool,
 ) -> None:
     """Predict a trace by a posterior, write the predictions, and print the agreement."""
     from mesoslip.inference.predict import predict
@@ -130,7 +142,14 @@ def _predict(
     with stopped_by_signals() as stop:
         try:
             with progress_shown(quiet) as progress:
-                tree = predict(posterior, trace, executor=workers, progress=progress, stop=stop)
+                tree = predict(
+                    posterior,
+                    trace,
+                    **({} if predictions is None else {"predictions": predictions}),
+                    executor=workers,
+                    progress=progress,
+                    stop=stop,
+                )
         except StoppedError:
             say(f"{path}: interrupted")
             raise typer.Exit(stop.exit_status) from None

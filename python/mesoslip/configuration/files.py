@@ -192,7 +192,7 @@ def override(base: Merged, changes: Iterable[Change]) -> Merged:
     # All changes at once: keys set together with a new kind are not dropped.
     together: dict[str, Any] = {}
     for change in changes:
-        tables_of_it = _parse_change(change) if isinstance(change, str) else _undotted(change)
+        tables_of_it = _parse_change(change) if isinstance(change, str) else undotted(change)
         together = _together(together, tables_of_it)
     return _merge_over(base, together)
 
@@ -215,15 +215,15 @@ def _parse_change(text: str) -> dict[str, Any]:
     if not equals or not re.fullmatch(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*", key):
         raise ConfigError([Problem("--set", text, "must look like contacts.delay=1ms")])
     if value == NONE:
-        return _undotted({key: None})
+        return undotted({key: None})
     try:
         parsed = tomllib.loads(f"value = {value}")["value"]
     except (ValueError, RecursionError):
         parsed = value
-    return _undotted({key: parsed})
+    return undotted({key: parsed})
 
 
-def _undotted(tables: Mapping[str, Any]) -> dict[str, Any]:
+def undotted(tables: Mapping[str, Any]) -> dict[str, Any]:
     """Tables whose names may be dotted, as nested ones."""
     nested: dict[str, Any] = {}
     for key, value in tables.items():

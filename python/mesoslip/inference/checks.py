@@ -23,6 +23,8 @@ NEARLY_ALL, HARDLY_ANY = 0.95, 0.05
 # Maximum deviation, in spreads, and regularization of a covariance, in mean variances.
 MAX_DEVIATION = 30.0
 RIDGE = 1e-3
+# Minimum of 1 - leverage of a prediction on the covariance.
+MIN_REMAINDER = 1e-9
 # Standard deviation of the prior on the unit cube.
 PRIOR_DEVIATION = 12**-0.5
 # Shrinkage below which a parameter is not determined, and above which it is.
@@ -66,12 +68,13 @@ class Agreement:
 
 
 def compare(
-    features: Sequence[Feature], simulated: Array, predicted: Array, observed: Array
+    features: Sequence[Feature], simulated: Array | None, predicted: Array, observed: Array
 ) -> Agreement:
     """Compare a trace with predictions of the posterior.
 
     The distance of each group of summaries is Mahalanobis', with the covariance of simulations near
-    the posterior, so that unusual combinations of summaries disagree too. Distances are ranked
+    the posterior, so that unusual combinations of summaries disagree too. Without simulations it is
+    that of the predictions, for each of them that of the others. Distances are ranked
     among those of the predictions, without assuming a distribution. The largest disagreement of a
     group is compared with the largest one of each prediction.
 
@@ -89,26 +92,23 @@ def compare(
     low, high = np.nanpercentile(predicted[:, compared], [16, 84], axis=0)
     spread[compared] = (high - low) / 2
     compared &= spread > 1e-9 * (1 + np.abs(centre))
+    spread[~compared] = np.nan
     scores[compared] = (observed - centre)[compared] / spread[compared]
     names = np.array([one.group for one in features])
     groups = [one for one in dict.fromkeys(names) if np.any(compared & (names == one))]
     own, trace = np.zeros((len(predicted), len(groups))), np.zeros(len(groups))
+    standard = [
+        np.clip(np.nan_to_num((one - centre) / spread), -MAX_DEVIATION, MAX_DEVIATION)
+        for one in (predicted, observed, simulated)
+        if one is not None
+    ]
     for index, group in enumerate(groups):
         inside = compared & (names == group)
-        reference, others, mine = (
-            np.clip(
-                np.nan_to_num((one[..., inside] - centre[inside]) / spread[inside]),
-                -MAX_DEVIATION,
-                MAX_DEVIATION,
-            )
-            for one in (simulated, predicted, observed)
+        own[:, index], trace[index] = _distances(
+            standard[0][:, inside],
+            standard[1][inside],
+            None if simulated is None else standard[2][:, inside],
         )
-        covariance = np.cov(reference.T).reshape(len(mine), -1)
-        # Regularized, for summaries that hardly vary in simulations.
-        covariance += RIDGE * np.mean(np.diag(covariance)) * np.eye(len(mine))
-        inverse = np.linalg.inv(covariance)
-        own[:, index] = np.einsum("ij,jk,ik->i", others, inverse, others)
-        trace[index] = mine @ inverse @ mine
     # For each prediction and group, the fraction of predictions at the same distance or more.
     count = len(predicted)
     ranks = (count - np.argsort(np.argsort(own, axis=0), axis=0)) / count
@@ -139,6 +139,28 @@ def compare(
         ranked,
         tuple(sentences(features, disagreeing, scores, observed, predicted)),
     )
+
+
+def _distances(others: Array, mine: Array, reference: Array | None) -> tuple[Array, float]:
+    """Squared distances of predictions and of the trace from the median of the predictions.
+
+    Without a reference the covariance is that of the predictions, but for each prediction without
+    itself: it would be nearer to the others than the trace, which is not one of them.
+    """
+    covariance = np.cov((others if reference is None else reference).T).reshape(len(mine), -1)
+    # Regularized, for summaries that hardly vary in simulations.
+    covariance += RIDGE * np.mean(np.diag(covariance)) * np.eye(len(mine))
+    inverse = np.linalg.inv(covariance)
+    own = np.einsum("ij,jk,ik->i", others, inverse, others)
+    if reference is None:
+        count = len(others)
+        away = others - others.mean(axis=0)
+        # Each prediction's part of the covariance is taken out (Sherman & Morrison 1950).
+        part = count / (count - 1) ** 2
+        leverage = part * np.einsum("ij,jk,ik->i", away, inverse, away)
+        along = np.einsum("ij,jk,ik->i", others, inverse, away)
+        own += part * along**2 / np.maximum(1 - leverage, MIN_REMAINDER)
+    return own, float(mine @ inverse @ mine)
 
 
 def _unusual(distance: Array, limit: Array) -> Array:

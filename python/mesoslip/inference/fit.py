@@ -29,9 +29,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-# Number of predicted traces, and a smaller one if most simulations have fewer contacts than these.
-PREDICTIONS = 160
-FEW_PREDICTIONS = 100
 # Maximum number of stored samples of a predicted trace.
 MAX_SAMPLES = 3000
 # Number of traces with additional noise.
@@ -90,11 +87,12 @@ def fit(
 ) -> FitResult:
     """Fit parameters to outputs with a trace each; see `mesoslip.fit`."""
     check_installed()
+    plan = plan.of_traces(len(trees))
     simulator = prepare(trees, names, plan)
     observed, left_out = usable_summaries(simulator)
     used = np.where(left_out, np.nan, observed)
     rng = np.random.default_rng(plan.seed)
-    count = FEW_PREDICTIONS if simulator.coarse_count else PREDICTIONS
+    count = plan.prediction_count
     with ExitStack() as stack:
         kept = None
         if store is not None:
@@ -130,6 +128,7 @@ def fit(
 
 def prepare(trees: Sequence[xr.DataTree], names: Sequence[str], plan: Plan) -> Simulator:
     """The simulator of experiments, with their traces."""
+    plan = plan.of_traces(len(trees))
     several = len(trees) > 1
     experiments = [
         prepare_experiment(tree, plan, name if several else "", number)
@@ -144,7 +143,9 @@ def prepare(trees: Sequence[xr.DataTree], names: Sequence[str], plan: Plan) -> S
             replace(one, wander_length=length, apparatus=apparatus)
             for one, apparatus in zip(experiments, own, strict=True)
         ]
-    return Simulator(tuple(experiments), plan.prior, plan.seed, plan.coarse_count)
+    return Simulator(
+        tuple(experiments), plan.prior, plan.seed, plan.coarse_count, plan.shares_track
+    )
 
 
 def usable_summaries(simulator: Simulator) -> tuple[Array, NDArray[np.bool_]]:

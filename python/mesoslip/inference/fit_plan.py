@@ -6,25 +6,50 @@ import difflib
 import math
 import os
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from mesoslip.configuration.config import Config
-from mesoslip.configuration.files import Change, on_base, override, read_toml
-from mesoslip.configuration.keys import KeyKind, key_kind, nearest_keys
+from mesoslip.configuration.files import (
+    Change,
+    Merged,
+    on_base,
+    override,
+    read_toml,
+    undotted,
+)
+from mesoslip.configuration.keys import key_kind, nearest_keys
 from mesoslip.configuration.units import to_si
 from mesoslip.errors import ConfigError, Problem
-from mesoslip.inference.prior import WANDER, FreeParameter, Prior
+from mesoslip.inference.prior import (
+    FILTER,
+    LEVEL,
+    WANDER,
+    FreeParameter,
+    Prior,
+    level_name,
+    level_parameter,
+)
 
-KEYS = ("free", "noise", "after", "simulations", "seed", "wander", "simulated_contacts")
+KEYS = (
+    *("free", "noise", "after", "simulations", "predictions", "seed", "simulated_contacts"),
+    *("wander", "level", "filter", "shared_track"),
+)
 RANGE_KEYS = ("from", "to", "prior")
 # Range of the amplitude of a slow variation of the strength, relative to the maximum force.
 WANDER_RANGE = (2e-3, 0.5)
+# What a level multiplies: the forces of all contacts, or the force that is recorded; and default
+# standard deviation of its logarithm, and the maximum one.
+LEVELS = ("contacts", "record")
+LEVEL_WIDTH, MAX_LEVEL_WIDTH = 0.2, 1.0
 # Tables that do not describe the experiment.
 NOT_FITTED = ("run.", "output.", "curve.")
 PRIORS = ("uniform", "logarithmic")
 MIN_SIMULATIONS = 300
+# Number of predicted traces of a fit, a smaller one if most simulations have fewer contacts than
+# these, and minimum: fewer cannot reject a model.
+PREDICTIONS, FEW_PREDICTIONS, MIN_PREDICTIONS = 160, 100, 50
 MIN_CONTACTS = 100
 # Kinds of sliders with a mass, and with a spring.
 HAS_MASS = ("rigid", "layered")
@@ -45,6 +70,8 @@ class Plan:
     """Standard deviation of the noise of the force [N]; estimated by default."""
     after: float = 0.0
     """Time from which the trace is used [s]; at 0 the first loading and slip are used too."""
+    after_distance: float = 0.0
+    """Displacement of the drive from which the trace is used instead [m], if it is above 0."""
     simulations: int = 1600
     """Number of simulations."""
     seed: int = 1
@@ -55,6 +82,16 @@ class Plan:
     """Whether several traces are fitted, each with its own drive and spring."""
     assumed: tuple[str, ...] = ()
     """Assumptions beyond the configuration, a sentence each."""
+    level_width: float = 0.0
+    """Standard deviation of the logarithm of the level of each trace; 0 without levels."""
+    level_of: str = LEVELS[0]
+    """What a level multiplies, one of `LEVELS`."""
+    filter_time: float = 0.0
+    """Time constant of the load cell [s], if it is known; 0 without a filter."""
+    predictions: int | None = None
+    """Number of predicted traces, if it is given."""
+    shares_track: bool = False
+    """Whether all traces have the same track, from its start on."""
 
     @classmethod
     def load(
@@ -69,7 +106,7 @@ class Plan:
         """
         path = Path(path)
         merged = read_toml(path)
-        tables = override(merged, overrides).tables
+        tables = override(_nested(merged), overrides).tables
         return cls._checked(tables, str(path), known, merged.base)
 
     @classmethod
@@ -119,21 +156,48 @@ class Plan:
         for one in free:
             reader.check_range(one, config)
         if reader.flag(table, "wander"):
-            free.append(FreeParameter(WANDER, *WANDER_RANGE, is_logarithmic=True, is_nuisance=True))
+            free.append(FreeParameter(WANDER, *WANDER_RANGE, is_logarithmic=True))
+        filter_time = reader.filter(table, free)
+        level_width, level_of = reader.level(table)
+        after = reader.after(table)
+        shares_track = reader.flag(table, "shared_track")
+        if shares_track and config.contacts.track is None:
+            reader.wrong("fit.shared_track", "there is no [contacts.track]", value=True)
         plan = cls(
             config,
             Prior(tuple(free)),
             reader.quantity(table, "noise", "N", "0.1 uN"),
-            reader.quantity(table, "after", "s", "2 s") or 0.0,
+            *after,
             reader.whole(table, "simulations", cls.simulations, MIN_SIMULATIONS),
             reader.whole(table, "seed", cls.seed, 0),
             reader.whole(table, "simulated_contacts", cls.simulated_contacts, MIN_CONTACTS),
-            known is not None and known.traces > 1,
-            tuple(assumed),
+            assumed=tuple(assumed),
+            level_width=level_width,
+            level_of=level_of,
+            filter_time=filter_time,
+            predictions=(
+                reader.whole(table, "predictions", PREDICTIONS, MIN_PREDICTIONS)
+                if "predictions" in table
+                else None
+            ),
+            shares_track=shares_track,
         )
         if reader.problems:
             raise ConfigError(reader.problems)
         return plan
+
+    def of_traces(self, count: int) -> Plan:
+        """The plan for a number of traces, with a level of each."""
+        free = self.prior.free
+        if self.level_width and not any(one.key.startswith(LEVEL) for one in free):
+            names = [level_name(number, count) for number in range(count)]
+            free += tuple(level_parameter(self.level_width, one) for one in names)
+        return replace(self, prior=Prior(free), has_several=count > 1)
+
+    @property
+    def prediction_count(self) -> int:
+        """Number of predicted traces."""
+        return self.predictions or (FEW_PREDICTIONS if self.coarse_count else PREDICTIONS)
 
     @property
     def coarse_count(self) -> int | None:
@@ -142,6 +206,15 @@ class Plan:
         if "contacts.count" in self.prior.keys or self.config.contact_kind.on_lattice:
             return None
         return self.simulated_contacts if contacts.count >= 2 * self.simulated_contacts else None
+
+
+def _nested(merged: Merged) -> Merged:
+    """Tables with free keys as nested ones, as changes of them are."""
+    table = merged.tables.get("fit")
+    if not isinstance(table, Mapping) or not isinstance(table.get("free"), Mapping):
+        return merged
+    free = undotted(table["free"])
+    return replace(merged, tables={**merged.tables, "fit": {**table, "free": free}})
 
 
 def _place(tables: dict[str, Any], one: FreeParameter) -> None:
@@ -169,8 +242,6 @@ class Known:
     period: float
     """Period of the setup as estimated from the slips; infinite if unknown."""
     duration: float
-    traces: int = 1
-    """Number of traces."""
 
     def complete(self, tables: dict[str, Any], free: list[FreeParameter]) -> list[str]:
         """Add missing keys of the apparatus to a configuration; returns the assumptions.
@@ -244,6 +315,50 @@ class _Reader:
             return default
         return value
 
+    def after(self, table: Mapping[str, Any]) -> tuple[float, float]:
+        """The time or the displacement of the drive from which traces are used."""
+        value = table.get("after")
+        if isinstance(value, str):
+            try:
+                length = to_si(value, "m", "50 um")
+            except ValueError:
+                pass
+            else:
+                self.quantity({"after": length}, "after", "m", "50 um")
+                return 0.0, length
+        return self.quantity(table, "after", "s", "2 s' or '50 um") or 0.0, 0.0
+
+    def filter(self, table: Mapping[str, Any], free: list[FreeParameter]) -> float:
+        """The time constant of the load cell, if it is known; a free one becomes a parameter."""
+        given = table.get("filter")
+        if not isinstance(given, Mapping):
+            return self.quantity(table, "filter", "s", "2 ms") or 0.0
+        found = self._range(FILTER, FILTER, given, "s")
+        if found is not None and found.low < 0:
+            self.wrong(f"{FILTER}.from", "must not be negative", given["from"])
+        if found is not None:
+            free.append(found)
+        return 0.0
+
+    def level(self, table: Mapping[str, Any]) -> tuple[float, str]:
+        """Width of the prior of the levels, and what they multiply."""
+        given = table.get("level", False)
+        if not isinstance(given, Mapping):
+            return LEVEL_WIDTH if self.flag(table, "level") else 0.0, LEVELS[0]
+        for name in given:
+            if name not in {"width", "of"}:
+                self.unknown(f"{LEVEL}.{name}", name, ("width", "of"))
+        width = given.get("width", LEVEL_WIDTH)
+        is_number = isinstance(width, int | float) and not isinstance(width, bool)
+        if not is_number or not 0 < width <= MAX_LEVEL_WIDTH:
+            message = f"must be a number above 0, at most {MAX_LEVEL_WIDTH:g}"
+            self.wrong(f"{LEVEL}.width", message, width)
+            width = LEVEL_WIDTH
+        what = given.get("of", LEVELS[0])
+        if what not in LEVELS:
+            self.wrong(f"{LEVEL}.of", "must be 'contacts' or 'record'", what)
+        return width, what
+
     def _si(self, key: str, value: object, unit: str, example: str) -> float | None:
         try:
             return to_si(value, unit, example)
@@ -276,14 +391,13 @@ class _Reader:
                 hint = f"; did you mean {near[0]!r}?" if near else ""
                 self.wrong(full_key, f"is no key that can be fitted{hint}")
                 continue
-            one = self._range(full_key, key, ranges, kind)
+            one = self._range(full_key, key, ranges, kind.unit or "1", is_whole=kind.is_whole)
             if one is not None:
                 yield one
 
     def _range(
-        self, full_key: str, key: str, ranges: object, kind: KeyKind
+        self, full_key: str, key: str, ranges: object, unit: str, *, is_whole: bool = False
     ) -> FreeParameter | None:
-        unit = kind.unit or "1"
         if not isinstance(ranges, Mapping):
             self.wrong(full_key, 'must be a table such as { from = "5 uN", to = "100 uN" }', ranges)
             return None
@@ -313,7 +427,7 @@ class _Reader:
                 ranges["from"],
             )
             return None
-        return FreeParameter(key, low, high, prior == "logarithmic", unit, kind.is_whole)
+        return FreeParameter(key, low, high, prior == "logarithmic", unit, is_whole)
 
     def check_range(self, one: FreeParameter, config: Config) -> None:
         """Check that both ends of a range are valid."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import tomllib
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from mesoslip.analysis.even_traces import even_trace
@@ -108,10 +107,12 @@ def as_plan(
 ) -> Plan:
     """The plan of a fit from its file or from nested tables, completed from the traces."""
     if isinstance(config, Plan):
-        return replace(config, has_several=len(trees) > 1)
-    if isinstance(config, Mapping):
-        return Plan.from_dict(config, known=known_of(trees))
-    return Plan.load(as_path(config), changes, known_of(trees))
+        plan = config
+    elif isinstance(config, Mapping):
+        plan = Plan.from_dict(config, known=known_of(trees))
+    else:
+        plan = Plan.load(as_path(config), changes, known_of(trees))
+    return plan.of_traces(len(trees))
 
 
 def known_of(trees: Sequence[xr.DataTree]) -> Known:
@@ -129,7 +130,6 @@ def known_of(trees: Sequence[xr.DataTree]) -> Known:
         _number(traced, "slider", "stiffness", "N/m"),
         period,
         float(time[-1] - time[0]),
-        len(trees),
     )
 
 

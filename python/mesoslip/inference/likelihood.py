@@ -155,6 +155,15 @@ class Surrogate:
     """Coefficients of the log odds that the summaries of the trace are defined for a simulation;
     None if they always are."""
 
+    @property
+    def simulations_for_products(self) -> int:
+        """Number of simulations from which on products of parameters are terms of the polynomial; 0
+        if they are."""
+        size = len(self.centre)
+        if size < 2 or any(len(set(one)) > 1 for one in self.powers):
+            return 0
+        return SIMULATIONS_PER_TERM * (size + 1) * (size + 2) // 2
+
     @cached_property
     def _unmix(self) -> Array:
         """Transformation of correlated deviations to independent ones."""

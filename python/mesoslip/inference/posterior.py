@@ -134,6 +134,10 @@ def build_tree(fitted: FitResult) -> xr.DataTree:
     }
     if WANDER in prior.keys:
         attributes["wander_length"] = first.wander_length
+    if plan.level_width:
+        attributes["level_of"] = plan.level_of
+    if plan.filter_time:
+        attributes["filter_time"] = plan.filter_time
     groups = {
         "/": xr.Dataset(attrs=program_attributes(plan.config, "fit") | attributes),
         "/posterior": group(values, chains),
@@ -148,7 +152,7 @@ def build_tree(fitted: FitResult) -> xr.DataTree:
         "/parameters": _parameters(fitted, needs),
     }
     for number, one in enumerate(fitted.predictions):
-        groups |= trace_groups(one, plan.after, number)
+        groups |= trace_groups(one, number)
     return xr.DataTree.from_dict(groups)
 
 
@@ -157,11 +161,12 @@ def suffix(number: int) -> str:
     return f"_{number + 1}" if number else ""
 
 
-def trace_groups(prediction: Prediction, start: float, number: int) -> dict[str, xr.Dataset]:
-    """Groups of a trace and its predictions, by the time of its first sample [s] and its number."""
+def trace_groups(prediction: Prediction, number: int) -> dict[str, xr.Dataset]:
+    """Groups of a trace and its predictions, by its number."""
     import xarray as xr
 
     experiment = prediction.experiment
+    start = experiment.sampling.start
     times = experiment.summarizer.time + start
     force = {"units": "N", "long_name": "force of the drive on the slider"}
     time = ("time", times, {"units": "s", "long_name": "time"})
@@ -192,11 +197,11 @@ def _notes(fitted: FitResult) -> Iterator[str]:
         one = prediction.experiment
         name = f"{one.name}: " if one.name else ""
         yield from (f"{name}{correction}" for correction in one.corrections)
-        if one.sampling.lead:
-            lead = with_unit(one.sampling.lead * one.sampling.interval, "s", 2)
+        if one.needs_run_in:
             yield (
-                f"{name}the trace begins under force: simulations start {lead} before it, and its "
-                "start is not used"
+                f"{name}the trace begins under force: simulations run in before it "
+                f"({with_unit(one.run_in, 's', 2)} for the known parameters), and its start is not "
+                "used"
             )
         if one.sampling.block > 1:
             yield f"{name}means of {one.sampling.block} samples are used"
@@ -221,8 +226,25 @@ def _notes(fitted: FitResult) -> Iterator[str]:
                 f"{name} of {titles[one.trace]}" for name, one in zip(named, features, strict=True)
             ]
         yield f"left out, as noise dominates: {', '.join(dict.fromkeys(named))}"
+    if needed := fitted.estimate.surrogate.simulations_for_products:
+        yield (
+            f"the likelihood is learnt from {len(fitted.estimate.parameters)} simulations near the "
+            f"posterior, without products of parameters, for which it needs {needed}: intervals "
+            "are wider than the traces allow (fit.simulations)"
+        )
+    if fitted.plan.level_width:
+        what = {"contacts": "the forces of all contacts", "record": "the recorded force"}
+        yield (
+            f"each trace has a level, a factor on {what[fitted.plan.level_of]}: "
+            + ", ".join(
+                f"{one.instrument.level} of {one.name}" if one.name else one.instrument.level
+                for one in experiments
+            )
+        )
     if keys := fitted.plan.config.contacts.place_keys:
-        yield f"each trace is taken to have a track of its own ({', '.join(keys)})"
+        owner = "all traces are" if fitted.plan.shares_track else "each trace is"
+        which = "the same track" if fitted.plan.shares_track else "a track of its own"
+        yield f"{owner} taken to have {which} ({', '.join(keys)})"
     elif WANDER not in fitted.plan.prior.keys:
         yield "the strength is taken to be the same along the track (fit.wander = false)"
 
@@ -300,6 +322,11 @@ def _parameters(fitted: FitResult, needs: dict[str, tuple[str, ...]]) -> xr.Data
                 "parameter",
                 [declared.get(one.key, math.nan) for one in prior.free],
                 {"long_name": "value that the first trace declares, in SI"},
+            ),
+            "width": (
+                "parameter",
+                [one.width for one in prior.free],
+                {"long_name": "standard deviation of the logarithm, of a normal prior"},
             ),
             "low": ("parameter", [one.low for one in prior.free]),
             "high": ("parameter", [one.high for one in prior.free]),

@@ -18,10 +18,10 @@ from mesoslip.execution.executors import ExecutorLike
 from mesoslip.execution.stop import StopRequest
 from mesoslip.inference.apparatus import of_predicted, predicted_sentences
 from mesoslip.inference.checks import compare
-from mesoslip.inference.fit import PREDICTIONS, predict_traces, usable_summaries
-from mesoslip.inference.fit_plan import Plan
+from mesoslip.inference.fit import predict_traces, usable_summaries
+from mesoslip.inference.fit_plan import LEVELS, MIN_PREDICTIONS, Plan
 from mesoslip.inference.posterior import summaries_group, trace_groups
-from mesoslip.inference.prior import WANDER, FreeParameter, Prior
+from mesoslip.inference.prior import LEVEL, WANDER, FreeParameter, Prior, level_parameter
 from mesoslip.inference.simulations import Simulations, Simulator
 from mesoslip.inference.traced_experiment import prepare
 from mesoslip.output.inputs import OutputLike, as_run, open_output, trace_name
@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+# Number of predicted traces.
+PREDICTIONS = 60
 # Maximum number of directions in which predictions are compared, and predictions for each.
 MAX_DIRECTIONS = 10
 PREDICTIONS_PER_DIRECTION = 12
@@ -43,12 +45,17 @@ MAX_DEVIATION = 30.0
 RESAMPLINGS = 200
 
 
-@arguments.checked(after=arguments.number(), progress=arguments.function)
+@arguments.checked(
+    after=arguments.number(),
+    predictions=arguments.whole(MIN_PREDICTIONS),
+    progress=arguments.function,
+)
 def predict(
     posterior: OutputLike,
     output: OutputLike,
     *,
     after: float = 0.0,
+    predictions: int = PREDICTIONS,
     executor: ExecutorLike = None,
     progress: Callable[[float], None] | None = None,
     stop: StopRequest | None = None,
@@ -65,6 +72,9 @@ def predict(
         fitted one declare; if the fitted one declares nothing, it is what this trace declares.
     after
         Time from which the trace is used [s].
+    predictions
+        Number of predicted traces, at least 50. The probability is at least the inverse of one
+        more.
     executor, progress, stop
         See `fit`.
 
@@ -87,7 +97,20 @@ def predict(
     prior = prior_of(fitted)
     config = Config.from_toml(fitted.attrs["configuration"])
     seed = int(fitted.attrs["seed"])
-    plan = Plan(config, prior, after=after, seed=seed, has_several=True)
+    rng = np.random.default_rng([seed, 4])
+    draws = fitted["posterior"].to_dataset()
+    values = np.stack([draws[key].values.ravel() for key in prior.keys], axis=-1)
+    points = np.clip(prior.unit(values[rng.choice(len(values), predictions, replace=False)]), 0, 1)
+    prior, points = _with_own_level(prior, points, rng)
+    plan = Plan(
+        config,
+        prior,
+        after=after,
+        seed=seed,
+        level_of=str(fitted.attrs.get("level_of", LEVELS[0])),
+        filter_time=float(fitted.attrs.get("filter_time", 0.0)),
+    )
+    plan = replace(plan, has_several=True)
     experiment = prepare(trace, plan, trace_name(output, trace))
     if WANDER in prior.keys:
         experiment = replace(experiment, wander_length=float(fitted.attrs["wander_length"]))
@@ -96,15 +119,11 @@ def predict(
     simulator = Simulator((experiment,), prior, seed)
     observed, left_out = usable_summaries(simulator)
     simulations = Simulations(
-        simulator, expected=PREDICTIONS, executor=executor, progress=progress, stop=stop
+        simulator, expected=predictions, executor=executor, progress=progress, stop=stop
     )
-    draws = fitted["posterior"].to_dataset()
-    values = np.stack([draws[key].values.ravel() for key in prior.keys], axis=-1)
-    rng = np.random.default_rng([seed, 4])
-    points = np.clip(prior.unit(values[rng.choice(len(values), PREDICTIONS, replace=False)]), 0, 1)
-    predicted, predictions = predict_traces(simulations, points)
+    predicted, traces = predict_traces(simulations, points)
     used = np.where(left_out, np.nan, predicted)
-    agreement = compare(simulator.features, used, used, np.where(left_out, np.nan, observed))
+    agreement = compare(simulator.features, None, used, np.where(left_out, np.nan, observed))
     kept = {f"/{name}": fitted[name].to_dataset() for name in ("posterior", "prior", "parameters")}
     attributes = fitted.attrs | {
         "title": f"Prediction of {experiment.name}",
@@ -128,7 +147,7 @@ def predict(
             "/summaries": summaries_group(
                 simulator.features, observed, predicted, agreement.scores, left_out
             ),
-            **trace_groups(predictions[0], after, 0),
+            **trace_groups(traces[0], 0),
         }
     )
 
@@ -158,10 +177,25 @@ def prior_of(posterior: xr.DataTree) -> Prior:
                 bool(one["is_logarithmic"].item()),
                 str(one["units"].item()),
                 kind is not None and kind.is_whole,
-                key == WANDER,
+                one["width"].item() if "width" in data else 0.0,
             )
         )
     return Prior(tuple(found))
+
+
+def _with_own_level(prior: Prior, points: Array, rng: np.random.Generator) -> tuple[Prior, Array]:
+    """The prior and points on its unit cube, with a level from its prior instead of those of the
+    fitted traces: the level of another trace is unknown."""
+    is_level = np.array([one.key.startswith(LEVEL) for one in prior.free])
+    if not is_level.any():
+        return prior, points
+    width = next(one.width for one in prior.free if one.key.startswith(LEVEL))
+    free = [one for one in prior.free if not one.key.startswith(LEVEL)]
+    own = rng.random((len(points), 1))
+    return (
+        Prior((level_parameter(width, f"{LEVEL}.1"), *free)),
+        np.concatenate([own, points[:, ~is_level]], axis=1),
+    )
 
 
 def _declared_in(posterior: xr.DataTree) -> dict[str, float]:

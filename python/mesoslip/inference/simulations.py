@@ -36,6 +36,8 @@ class Simulator:
     seed: int
     coarse_count: int | None = None
     """Number of contacts in most simulations; None if all have that of the interface."""
+    shares_track: bool = False
+    """Whether all experiments have the same track."""
 
     @cached_property
     def features(self) -> tuple[Feature, ...]:
@@ -72,6 +74,10 @@ class Simulator:
         for index, one in enumerate(self.experiments):
             seeds = (self.seed, number, index) if index else (self.seed, number)
             words = np.random.SeedSequence(seeds).generate_state(3, np.uint64)
+            if index == 0:
+                first = words[0]
+            elif self.shares_track:
+                words[0] = first
             force = one.simulated(changes, nuisances, words, stop)
             if force is None:
                 return None
@@ -92,12 +98,13 @@ class Simulator:
 
     def fingerprint(self, observed: Array) -> str:
         """A hash of everything that determines the simulations of a fit."""
-        known: list[object] = [self.prior, self.seed, self.coarse_count]
+        known: list[object] = [self.prior, self.seed, self.coarse_count, self.shares_track]
         state = [np.nan_to_num(observed)]
         for one in self.experiments:
             known += [one.config.to_toml(), one.noise, one.wander_length, one.summarizer.period]
             sampling = one.sampling
-            known += [sampling.start, sampling.block, sampling.lead, one.apparatus]
+            known += [sampling.start, sampling.block, one.apparatus, one.instrument]
+            known.append(one.needs_run_in)
             state += [sampling.times, one.force]
         text = repr((program(), *known)).encode()
         return hashlib.sha256(text + np.concatenate(state).tobytes()).hexdigest()

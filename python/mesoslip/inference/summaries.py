@@ -154,7 +154,7 @@ class Summarizer:
         if len(found):
             drop = self.direction * (found.force_before[0] - found.force_after[0]) / self.scale
             values["first_drop"] = math.log(max(drop, TINY))
-            values["first_rate"] = math.log(found.fall_rate[0] / self.scale)
+            values["first_rate"] = math.log(max(found.fall_rate[0] / self.scale, TINY))
             waveform = self._waveform(force, int(found.first[0]), int(found.last[0]))
             values |= {
                 f"first_waveform_{at:+.2f}": value
@@ -193,7 +193,7 @@ class Summarizer:
             "bottom": after[later],
             "drop": drop[later],
             "duration": np.log(found.end_time - found.start_time)[later],
-            "rate": np.log(found.fall_rate / self.scale)[later],
+            "rate": np.log(np.maximum(found.fall_rate / self.scale, TINY))[later],
             "waiting_time": np.log(np.diff(found.start_time)),
         }
         values = {}

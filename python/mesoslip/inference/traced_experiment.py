@@ -19,8 +19,10 @@ from mesoslip.errors import ConfigError, FileError, RunError
 from mesoslip.execution.stop import StoppedError, StopRequest
 from mesoslip.inference.apparatus import Apparatus, declared_values, own_config
 from mesoslip.inference.fit_plan import Plan
+from mesoslip.inference.instrument import Instrument
 from mesoslip.inference.noise import Noise, cleaned
-from mesoslip.inference.prior import WANDER
+from mesoslip.inference.prior import WANDER, level_name
+from mesoslip.inference.run_in import run_in_samples
 from mesoslip.inference.summaries import Summarizer
 from mesoslip.inference.wander import measured_length, wandering
 from mesoslip.simulation.realization import Realization
@@ -41,9 +43,8 @@ MIN_SAMPLES = 200
 # Minimum number of samples in a period of the setup after averaging.
 SAMPLES_PER_PERIOD = 24
 # Minimum initial force, over the maximum force, of a trace that does not begin with the first
-# loading, and time that a simulation starts before such a trace, in loadings to the maximum force.
+# loading.
 LOADED = 0.1
-LEAD_LOADINGS = 2.0
 # Maximum number of breaks in a simulation, far more than a trace can have.
 MAX_BREAKS = 3e7
 
@@ -58,8 +59,6 @@ class Sampling:
     """Time from which samples are used [s]."""
     block: int = 1
     """Number of samples in a mean."""
-    lead: int = 0
-    """Number of samples that a simulation starts before the first sample."""
 
     @cached_property
     def interval(self) -> float:
@@ -104,7 +103,6 @@ class Sampling:
 
     def sampled(self, force: Array) -> Array:
         """Samples at the times of this sampling, from a simulated trace at equal distances."""
-        force = force[self.lead :]
         if self.is_even:
             return force[: len(self.times)]
         return np.interp(self.times, self.interval * np.arange(len(force)), force)
@@ -112,8 +110,7 @@ class Sampling:
     @property
     def simulated_count(self) -> int:
         """Number of samples of a simulated trace."""
-        count = len(self.times) if self.is_even else math.ceil(self.times[-1] / self.interval) + 1
-        return self.lead + count
+        return len(self.times) if self.is_even else math.ceil(self.times[-1] / self.interval) + 1
 
 
 @dataclass(frozen=True)
@@ -131,8 +128,12 @@ class Experiment:
     force: Array
     """The measured force [N], corrected and reduced by the sampling."""
     apparatus: Apparatus
+    instrument: Instrument
     corrections: tuple[str, ...] = ()
     """Corrections of the trace, a sentence each."""
+    needs_run_in: bool = False
+    """Whether the trace begins in the middle of an experiment, so that a simulation runs in first.
+    """
 
     def simulated(
         self,
@@ -146,9 +147,16 @@ class Experiment:
         ``changes`` are values of the free keys, ``nuisances`` of other parameters, and three
         ``words`` determine the random numbers.
         """
+        count = self.sampling.simulated_count
         try:
             own = self.apparatus.values(changes)
             config = self.config.replace({**own, "run.seed": int(words[0]) >> 2})
+            config = self.instrument.levelled(config, nuisances)
+            start = self._run_in(config) if self.needs_run_in else 0
+            if start:
+                # Half an interval more, so that the last sample is not lost by rounding.
+                duration = (start + count - 0.5) * self.sampling.interval
+                config = config.replace({"run.duration": duration})
             run = Realization(config, 0, estimates_errors=False)
             while not run.finished and run.breaks < MAX_BREAKS:
                 if stop.is_set():
@@ -160,17 +168,29 @@ class Experiment:
         run.close()
         if not run.finished or run.breaks >= MAX_BREAKS:
             return None
-        if len(trace) < self.sampling.simulated_count:
+        if len(trace) < start + count:
             return None
-        force = self.sampling.sampled(trace[:, TRACE_COLUMNS.index("spring_force")])
+        exact = trace[:, TRACE_COLUMNS.index("spring_force")]
+        read = self.instrument.read(exact, self.sampling.interval, nuisances)
+        force = self.sampling.sampled(read[start:])
         rng = np.random.default_rng(words[1:])
         noisy = self.noise.added(force, self.sampling.interval, rng)
         if WANDER in nuisances:
-            drive = self.sampling.sampled(trace[:, TRACE_COLUMNS.index("drive_displacement")])
+            drive = trace[start:, TRACE_COLUMNS.index("drive_displacement")]
+            drive = self.sampling.sampled(drive)
             noisy = noisy + nuisances[WANDER] * self.summarizer.scale * wandering(
                 drive, self.wander_length, rng, starts_at_zero=self.summarizer.has_start
             )
         return self.sampling.reduced(noisy)
+
+    def _run_in(self, config: Config) -> int:
+        count, interval = self.sampling.simulated_count, self.sampling.interval
+        return run_in_samples(config, self.summarizer.scale, interval, count)
+
+    @property
+    def run_in(self) -> float:
+        """Time that a simulation of the known parameters starts before the trace [s]."""
+        return self._run_in(self.config) * self.sampling.interval if self.needs_run_in else 0.0
 
     def noisier(self, rng: np.random.Generator) -> Array:
         """The measured trace with doubled noise [N]."""
@@ -197,13 +217,21 @@ def prepare(tree: xr.DataTree, plan: Plan, name: str = "", number: int = 0) -> E
     time, force = time[is_known], force[is_known]
     if len(time) < 2:
         raise FileError(f"{_named(name)}the trace has {len(time)} samples")
-    sampling = Sampling(time - time[0], plan.after)
+    after = plan.after
+    if plan.after_distance > 0:
+        if not first_velocity(known):
+            raise FileError(
+                f"{_named(name)}fit.after is a displacement, and the trace has no velocity of the "
+                "drive: give a time"
+            )
+        after = plan.after_distance / abs(velocity)
+    sampling = Sampling(time - time[0], after)
     interval = sampling.interval
     count = len(sampling.time)
     if count < MIN_SAMPLES:
         raise FileError(
             f"{_named(name)}the trace has {count} samples"
-            + (f" after {plan.after:g} s" if plan.after else "")
+            + (f" after {after:g} s" if after else "")
             + f"; a fit needs at least {MIN_SAMPLES}"
         )
     scale = float(np.max(np.abs(force)))
@@ -218,16 +246,18 @@ def prepare(tree: xr.DataTree, plan: Plan, name: str = "", number: int = 0) -> E
     if more > 0:
         words = [plan.seed, 1, number] if number else [plan.seed, 1]
         force = force + more * np.random.default_rng(words).standard_normal(len(force))
-    is_midway = is_measured and not plan.after and _is_loaded(force, math.copysign(scale, velocity))
-    lead = 0
-    if is_midway and not known.drive.parts:
-        lead = math.ceil(_lead_time(known, scale, sampling.times[-1]) / interval)
-    config = _configured(known, replace(sampling, lead=lead), name)
+    is_midway = is_measured and not after and _is_loaded(force, math.copysign(scale, velocity))
+    if is_midway and plan.shares_track:
+        raise FileError(
+            f"{_named(name)}the trace begins in the middle of an experiment, so its place on the "
+            "track is unknown: leave out fit.shared_track"
+        )
+    config = _configured(known, sampling, name)
     whole = Sampling(sampling.times)
     period = _period(plan, config, whole.time, whole.reduced(force), noise.deviation)
     block = max(1, math.floor(period / interval / SAMPLES_PER_PERIOD))
     block = min(block, max(1, count // MIN_SAMPLES))
-    sampling = replace(sampling, block=block, lead=lead)
+    sampling = replace(sampling, block=block)
     reduced = sampling.reduced(force)
     summarizer = Summarizer(
         sampling.time,
@@ -235,7 +265,7 @@ def prepare(tree: xr.DataTree, plan: Plan, name: str = "", number: int = 0) -> E
         period,
         scale,
         math.copysign(1.0, velocity),
-        plan.after < interval / 2 and not is_midway,
+        after < interval / 2 and not is_midway,
         _pieces(root, is_known, sampling),
     )
     length = math.nan
@@ -250,7 +280,13 @@ def prepare(tree: xr.DataTree, plan: Plan, name: str = "", number: int = 0) -> E
         length,
         reduced,
         Apparatus(declared),
+        Instrument(
+            level_name(number, count=2 if plan.has_several else 1),
+            plan.level_of,
+            plan.filter_time,
+        ),
         corrections,
+        is_midway and not known.drive.parts,
     )
 
 
@@ -268,12 +304,6 @@ def _is_loaded(force: Array, scale: float) -> bool:
     """Whether a trace begins under force, not with the first loading of the interface."""
     first = force[: max(3, len(force) // 1000)]
     return float(np.median(first)) / scale > LOADED
-
-
-def _lead_time(config: Config, scale: float, duration: float) -> float:
-    """Time in which a simulation forgets its start [s]."""
-    rate = config.spring_stiffness * abs(first_velocity(config))
-    return min(LEAD_LOADINGS * scale / rate, duration) if 0 < rate < math.inf else duration
 
 
 def _named(name: str) -> str:

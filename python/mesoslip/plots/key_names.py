@@ -14,6 +14,8 @@ SYMBOLS = {
     "contacts.drag_rate": r"$\eta$",
     "contacts.thermal.force_ratio": "$f_T/f_s$",
     "contacts.thermal.rate": r"$\omega_0$",
+    "contacts.track.length": r"$\ell$",
+    "contacts.track.spread": "$w$",
     "drive.velocity": "$v_d$",
     "interaction.strength": r"$\xi$",
     "slider.damping": r"$\eta_S$",
@@ -21,7 +23,6 @@ SYMBOLS = {
     "slider.layers": "$N_l$",
     "slider.mass": "$M$",
     "slider.stiffness": "$K$",
-    "fit.wander": "wander",
 }
 # Names of keys whose last part is ambiguous, and of a measure.
 NAMES = {
@@ -53,4 +54,6 @@ def name_of(key: str) -> str:
 
 
 def _plain(key: str) -> str:
+    if key.startswith("fit."):
+        return key.removeprefix("fit.").replace(".", " ")
     return key.rpartition(".")[2].replace("_", " ")

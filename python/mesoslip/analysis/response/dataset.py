@@ -287,12 +287,13 @@ def scalars_of(tree: Tree, name: str) -> dict[str, Any]:
 
 
 def write_csv(tree: Tree, path: Path) -> None:
-    """Write a response as one table with a row for each stage.
+    """Write a response as one table with a row for each stage, and for each step of the load in it.
 
     A stage at constant velocity has the columns of ``steady``, and those of ``steps`` if it starts
     with a step; a hold has those of ``holds``, a constant force those of ``creep`` and, after a
     smaller one, of ``restarts``, a growing one those of ``ramps``. The notes on steps and
-    restarts have columns of their own.
+    restarts have columns of their own. Steps of the normal load have rows of their own after that
+    of their stage, with the columns of ``load_steps``.
 
     Raises
     ------
@@ -301,11 +302,12 @@ def write_csv(tree: Tree, path: Path) -> None:
     """
     own_notes = {"restarts": "restart_note", "steps": "step_note"}
     units: dict[str, str] = {}
-    table: dict[tuple[int, int], dict[str, Any]] = {}
-    for name in ("steady", "holds", "creep", "restarts", "ramps", "steps"):
+    table: dict[tuple[int, int, int], dict[str, Any]] = {}
+    for name in ("steady", "holds", "creep", "restarts", "ramps", "steps", "load_steps"):
         data = tree.children[name].to_dataset()
-        for row in rows_of(tree, name):
-            here = table.setdefault((row["output_index"], row["stage_number"]), {})
+        for number, row in enumerate(rows_of(tree, name), 1):
+            own = number if name == "load_steps" else 0
+            here = table.setdefault((row["output_index"], row["stage_number"], own), {})
             for column, value in row.items():
                 key = own_notes.get(name, column) if column == "note" else column
                 here[key] = None if value != value else value

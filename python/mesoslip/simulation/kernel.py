@@ -153,6 +153,7 @@ class Kernel:
         quiet_time: float,
         duration: float,
         layers: int,
+        blocks: int = 0,
     ) -> None:
         """Set the record of the motion; intervals and times in s, 0 for what is not recorded."""
         self._call(
@@ -163,6 +164,7 @@ class Kernel:
             quiet_time,
             duration,
             layers,
+            blocks,
         )
 
     def set_avalanches(

@@ -1,0 +1,490 @@
+!> Motion of a row of blocks from event to event, with a clock for each block (section 16).
+!>
+!> A step of the row is so short that the motion of each block in it is a polynomial, exact to
+!> rounding, if no contact breaks or attaches: the published motion, which its neighbours feel.
+!> A block whose contacts change continues from there on a motion of its own. What it has done
+!> since to its neighbours, beyond the published motion, grows with the fourth power of time: it is
+!> integrated, and given to them before it exceeds rounding. They continue from there on motions of
+!> their own in turn. So an event costs the work of one block and seldom of two or four more,
+!> however long the row.
+module mesoslip_sliders_interface_row
+   use mesoslip_interface_law, only: clocks, hazard_clock_type, interface_law_type, pose_type, &
+      & window_type
+   use mesoslip_numerics_kinds, only: wp
+   use mesoslip_sliders_hazard_clock, only: advance_clocks, limit_window
+   use mesoslip_sliders_interface_losses, only: add_losses, add_published_losses
+   use mesoslip_sliders_interface_polynomials, only: bound, evaluate, integrals, max_order, move
+   use mesoslip_sliders_interface_rest, only: try_rest
+   use mesoslip_sliders_interface_series, only: drive_at, expand, expand_all, fastest_rate
+   use mesoslip_sliders_interface_state, only: busy_pace, load_motion, min_order, &
+      & motion_of_damper, quiet_pace, row_state_type
+   use mesoslip_sliders_motion_series, only: first_end, inverse
+   implicit none
+   private
+
+   public :: row_slider_type
+
+   !> What ends the motion of a block: nothing in this step; the end of the window's time; its
+   !> upper and lower ends; a turning point; a clock; the end of its polynomial; its neighbours have
+   !> to know of it
+   integer, parameter :: event_none = 0, event_time = 1, event_upper = 2, event_lower = 3, &
+      & event_turn = 4, event_clock = 5, event_again = 6, event_publish = 7
+
+   !> Blocks in a row that move from event to event.
+   type, abstract, extends(row_state_type) :: row_slider_type
+   contains
+      procedure, non_overridable :: begin_step, next_event, stop_block, take_law, renew, end_step
+   end type row_slider_type
+
+contains
+
+   !> Begin a step that ends at a time or before: the motion of all blocks if nothing happens.
+   subroutine begin_step(self, end_time)
+      class(row_slider_type), intent(inout) :: self
+      !> Time [s]
+      real(wp), intent(in) :: end_time
+
+      integer :: order
+
+      self%step_time = self%time
+      self%base_time = self%time
+      self%end_time = end_time
+      self%moment = 0.0_wp
+      self%excess_once = 0.0_wp
+      self%excess_twice = 0.0_wp
+      self%block%is_own = .false.
+      self%block%exceeds = .false.
+      self%events = 0
+      self%pulled_once = 0.0_wp
+      self%pulled_lever = 0.0_wp
+      self%drag_part = 0.0_wp
+      self%damping_part = 0.0_wp
+      call self%sum_motion(1)
+
+      self%length = end_time - self%time
+      self%reaches_end = .true.
+      self%rests = .false.
+      if (self%is_quiet) call try_rest(self)
+      if (.not. self%rests) then
+         self%rate = fastest_rate(self)
+         if (self%length * self%rate > self%pace) then
+            self%length = self%pace / self%rate
+            self%reaches_end = .false.
+         end if
+         self%order = max_order
+         do order = min_order, max_order
+            if (self%rate * self%length <= self%reach(order)) then
+               self%order = order
+               exit
+            end if
+         end do
+         call expand_all(self)
+      end if
+      call predict_all(self)
+      ! A long step ends with its first event: in a short one more of them cost less.
+      self%ends_at_event = self%queue%first_time() < self%length &
+         & .and. (self%rests .or. self%pace > 2.0_wp * busy_pace)
+      if (self%ends_at_event) then
+         self%length = self%queue%first_time()
+         self%reaches_end = .false.
+      end if
+   end subroutine begin_step
+
+   !> Find what ends the motion of each block, unless all goes on as published.
+   subroutine predict_all(self)
+      class(row_state_type), intent(inout) :: self
+
+      real(wp) :: way(self%blocks)
+      integer :: block, term
+
+      way = abs(self%published(:, self%order))
+      do term = self%order - 1, 1, -1
+         way = way * self%length + abs(self%published(:, term))
+      end do
+      way = way * self%length
+      do block = 1, self%blocks
+         self%block(block)%kind = event_none
+         self%span(block) = huge(1.0_wp)
+         self%horizon(block) = self%length
+         associate (window => self%block(block)%window)
+            if (.not. (way(block) < min(window%upper - self%place(block), self%place(block) &
+               & - window%lower) .and. window%end_time - self%base_time > self%length) &
+               & .or. self%has_clocks) call predict(self, block)
+         end associate
+         call self%queue%put(block, self%span(block))
+      end do
+      call self%queue%rebuild()
+   end subroutine predict_all
+
+   !> Find what ends the motion of a block, and when.
+   subroutine predict(self, block)
+      class(row_state_type), intent(inout) :: self
+      integer, intent(in) :: block
+
+      type(window_type) :: window
+      type(hazard_clock_type) :: clock(clocks)
+      real(wp) :: series(0:max_order), velocity(0:max_order), step, longest, change
+      real(wp) :: above, below, direction
+      integer :: order, term
+      logical :: crosses, turns, is_due
+
+      call load_motion(self, block, series, order)
+      window = self%block(block)%window
+      if (self%has_clocks) call limit_window(self%block(block)%clock, self%base_time &
+         & + self%moment(block), self%speed(block), 2.0_wp * self%bend(block), window)
+      associate (kind => self%block(block)%kind)
+         kind = event_none
+         step = self%length
+         if (self%horizon(block) < self%length) then
+            kind = event_again
+            step = self%horizon(block)
+         end if
+         if (window%end_time - self%base_time <= step) then
+            kind = event_time
+            step = window%end_time - self%base_time
+         end if
+         step = max(0.0_wp, step - self%moment(block))
+         do term = 0, order - 1
+            velocity(term) = (term + 1) * series(term + 1)
+         end do
+         change = 0.0_wp
+         do term = order - 1, 1, -1
+            change = (change + abs(velocity(term))) * step
+         end do
+         above = window%upper - series(0)
+         below = window%lower - series(0)
+         if (step > 0.0_wp .and. .not. (abs(velocity(0)) + change) * step < min(above, -below)) then
+            longest = step
+            call first_end(velocity, order, above, below, change, step, crosses, turns, direction)
+            if (crosses) then
+               kind = merge(event_upper, event_lower, direction > 0.0_wp)
+            else if (turns) then
+               kind = event_turn
+            else if (step < longest) then
+               kind = event_again
+            end if
+         end if
+         if (self%has_clocks) then
+            clock = self%block(block)%clock
+            call advance_clocks(clock, velocity, order, step, is_due)
+            if (is_due) kind = event_clock
+         end if
+         if (self%block(block)%exceeds) call limit_by_excess(self, block, order, step)
+         self%span(block) = step
+         if (kind == event_none) self%span(block) = huge(1.0_wp)
+      end associate
+   end subroutine predict
+
+   !> Shorten a step until what its neighbours do not know of a block moves them by no more than
+   !> rounding.
+   subroutine limit_by_excess(self, block, order, step)
+      class(row_state_type), intent(inout) :: self
+      integer, intent(in) :: block, order
+      real(wp), intent(inout) :: step
+
+      integer, parameter :: max_trials = 60
+      real(wp) :: once, twice, effect
+      integer :: trial
+
+      do trial = 1, max_trials
+         call bound(self%excess(:, block), order, step, once, twice)
+         effect = self%bond * (twice + abs(self%excess_twice(block)) &
+            & + abs(self%excess_once(block)) * step) &
+            & + self%viscosity * (once + abs(self%excess_once(block)))
+         if (effect <= self%tiny_displacement) exit
+         self%block(block)%kind = event_publish
+         step = step * max(0.1_wp, min(0.9_wp, (0.5_wp * self%tiny_displacement / effect)**0.25_wp))
+      end do
+   end subroutine limit_by_excess
+
+   !> The block with the next event in the step; 0 if there is none.
+   pure function next_event(self) result(block)
+      class(row_slider_type), intent(in) :: self
+      integer :: block
+
+      block = 0
+      if (self%queue%first_time() <= self%length) block = self%queue%first()
+   end function next_event
+
+   !> Move a block to its event.
+   subroutine stop_block(self, block, pose, asks)
+      class(row_slider_type), intent(inout) :: self
+      integer, intent(in) :: block
+      !> Its pose then
+      type(pose_type), intent(out) :: pose
+      !> Whether its contacts have to respond
+      logical, intent(out) :: asks
+
+      call carry(self, block, self%span(block))
+      asks = .true.
+      select case (self%block(block)%kind)
+      case (event_upper)
+         self%place(block) = self%block(block)%window%upper
+      case (event_lower)
+         self%place(block) = self%block(block)%window%lower
+      case (event_turn)
+         self%speed(block) = 0.0_wp
+      case (event_again, event_publish)
+         asks = .false.
+      case default
+         continue
+      end select
+      pose = self%block_pose(block)
+      ! Nor may rounding keep it before the end of its window.
+      if (self%block(block)%window%end_time - self%base_time <= self%moment(block) &
+         & * (1.0_wp + 4.0_wp * epsilon(1.0_wp))) then
+         pose%time = max(pose%time, self%block(block)%window%end_time)
+      end if
+      if (asks) self%events = self%events + 1
+   end subroutine stop_block
+
+   !> Move a block along its motion, with the books of its work and losses.
+   subroutine carry(self, block, step)
+      class(row_state_type), intent(inout) :: self
+      integer, intent(in) :: block
+      !> Time from its own [s]
+      real(wp), intent(in) :: step
+
+      real(wp) :: series(0:max_order), velocity(0:max_order), damper(0:max_order), once, twice
+      real(wp) :: first_once, start
+      integer :: order, term
+      logical :: is_due
+
+      if (.not. step > 0.0_wp) return
+      call load_motion(self, block, series, order)
+      if (self%has_clocks) then
+         do term = 0, order - 1
+            velocity(term) = (term + 1) * series(term + 1)
+         end do
+         start = step
+         call advance_clocks(self%block(block)%clock, velocity, order, start, is_due)
+         self%elapsed(:, block) = self%elapsed(:, block) + self%block(block)%clock%elapsed
+      end if
+      if (self%pull(block) > 0.0_wp) then
+         call integrals(series, order, step, once, twice)
+         self%pulled_once = self%pulled_once + self%pull(block) * once
+         ! The weight is the time since the start of the step.
+         self%pulled_lever = self%pulled_lever + self%pull(block) &
+            & * ((self%moment(block) + step) * once - twice)
+      end if
+      call add_losses(self, block, series, order, step)
+      if (self%block(block)%exceeds) then
+         call integrals(self%excess(:, block), order, step, once, twice)
+         first_once = self%excess_once(block)
+         self%excess_once(block) = first_once + once
+         self%excess_twice(block) = self%excess_twice(block) + first_once * step + twice
+      end if
+      if (self%damping > 0.0_wp) then
+         once = 0.0_wp
+         damper = motion_of_damper(self, block, order)
+         do term = order - 1, 0, -1
+            once = once * step + damper(term)
+         end do
+         self%damper(block) = once
+      end if
+      start = self%place(block)
+      call evaluate(series, order, step, self%place(block), self%speed(block), self%bend(block))
+      if (abs(self%speed(block)) > 0.0_wp) self%sense(block) = sign(1.0_wp, self%speed(block))
+      self%moment(block) = self%moment(block) + step
+      if (self%has_clocks) then
+         associate (clock => self%block(block)%clock)
+            where (clock%is_used)
+               clock%left = clock%left - clock%elapsed
+               clock%rate = clock%rate * exp(clock%slope * (self%place(block) - start))
+            end where
+         end associate
+      end if
+   end subroutine carry
+
+   !> Move all blocks that go on as published to the end of the step, with their books.
+   subroutine carry_published(self)
+      class(row_state_type), intent(inout) :: self
+
+      real(wp), dimension(self%blocks) :: share, once, twice, part
+      integer :: term
+
+      ! 1 for a block that goes on as published.
+      share = merge(0.0_wp, 1.0_wp, self%block%is_own)
+      once = 0.0_wp
+      twice = 0.0_wp
+      associate (series => self%published, step => self%length)
+         do term = self%order, 0, -1
+            part = series(:, term) * inverse(term + 1)
+            once = once * step + part
+            twice = twice * step + part * inverse(term + 2)
+         end do
+         self%pulled_once = self%pulled_once + step * sum(share * self%pull * once)
+         self%pulled_lever = self%pulled_lever + step**2 * sum(share * self%pull * (once - twice))
+         call add_published_losses(self, share)
+         once = 0.0_wp
+         twice = 0.0_wp
+         part = 0.0_wp
+         do term = self%order, 0, -1
+            part = part * step + twice
+            twice = twice * step + once
+            once = once * step + series(:, term)
+         end do
+         where (.not. self%block%is_own)
+            self%place = once
+            self%speed = twice
+            self%bend = part
+         end where
+         if (self%damping > 0.0_wp) then
+            once = 0.0_wp
+            do term = self%order - 1, 0, -1
+               once = once * step + self%published_damper(:, term)
+            end do
+            where (.not. self%block%is_own) self%damper = once
+         end if
+         where (.not. self%block%is_own .and. abs(self%speed) > 0.0_wp)
+            self%sense = sign(1.0_wp, self%speed)
+         end where
+         where (.not. self%block%is_own) self%moment = step
+      end associate
+   end subroutine carry_published
+
+   !> Take the law that the contacts of a block offer.
+   subroutine take_law(self, block, law, window, clock)
+      class(row_slider_type), intent(inout) :: self
+      integer, intent(in) :: block
+      type(interface_law_type), intent(in) :: law
+      type(window_type), intent(in) :: window
+      type(hazard_clock_type), intent(in) :: clock(clocks)
+
+      self%block(block)%law = law
+      self%block(block)%window = window
+      self%block(block)%clock = clock
+      self%elapsed(:, block) = 0.0_wp
+      self%offer_moment(block) = self%moment(block)
+   end subroutine take_law
+
+   !> Continue the motion of a block after its event.
+   subroutine renew(self, block)
+      class(row_slider_type), intent(inout) :: self
+      integer, intent(in) :: block
+
+      integer :: neighbour
+
+      if (self%block(block)%kind == event_publish) then
+         call publish(self, block)
+         do neighbour = block - 1, block + 1, 2
+            if (neighbour < 1 .or. neighbour > self%blocks) cycle
+            call continue_motion(self, neighbour)
+         end do
+      end if
+      call continue_motion(self, block)
+   end subroutine renew
+
+   !> Expand the motion of a block, and find its next event.
+   subroutine continue_motion(self, block)
+      class(row_state_type), intent(inout) :: self
+      integer, intent(in) :: block
+
+      call expand(self, block, is_whole=.false.)
+      call predict(self, block)
+      call self%queue%update(block, self%moment(block) + self%span(block))
+   end subroutine continue_motion
+
+   !> Let the neighbours of a block know its motion.
+   subroutine publish(self, block)
+      class(row_state_type), intent(inout) :: self
+      integer, intent(in) :: block
+
+      real(wp) :: shown(0:max_order), value, slope, bend, excess
+      integer :: neighbour
+
+      shown(:self%order) = self%published(block, :self%order)
+      call evaluate(shown, self%order, self%moment(block), value, slope, bend)
+      excess = self%place(block) - value
+      call expand(self, block, is_whole=.true.)
+      do neighbour = block - 1, block + 1, 2
+         if (neighbour < 1 .or. neighbour > self%blocks) cycle
+         call carry(self, neighbour, self%moment(block) - self%moment(neighbour))
+         call give_excess(self, block, neighbour, excess)
+      end do
+      self%excess_once(block) = 0.0_wp
+      self%excess_twice(block) = 0.0_wp
+      shown(:self%order) = self%own(:self%order, block)
+      call move(shown, self%order, -self%moment(block), self%order)
+      self%published(block, :self%order) = shown(:self%order)
+   end subroutine publish
+
+   !> Give a neighbour what a block has done to it beyond its published motion.
+   subroutine give_excess(self, block, neighbour, excess)
+      class(row_state_type), intent(inout) :: self
+      integer, intent(in) :: block, neighbour
+      !> Displacement of the block beyond the published one [m]
+      real(wp), intent(in) :: excess
+
+      real(wp) :: kick
+
+      kick = self%bond * self%excess_once(block) + self%viscosity * excess
+      ! The work of the damping between them along the neighbour's motion, by parts.
+      self%damping_part = self%damping_part - self%viscosity * (excess * self%speed(neighbour) &
+         & - 2.0_wp * self%bend(neighbour) * self%excess_once(block))
+      self%place(neighbour) = self%place(neighbour) + self%bond * self%excess_twice(block) &
+         & + self%viscosity * self%excess_once(block)
+      self%speed(neighbour) = self%speed(neighbour) + kick
+      self%damper(neighbour) = self%damper(neighbour) + self%damping * kick
+      associate (window => self%block(neighbour)%window)
+         self%place(neighbour) = max(window%lower, min(window%upper, self%place(neighbour)))
+      end associate
+   end subroutine give_excess
+
+   !> End the step: all blocks move to its end, and to their neighbours goes what they do not know.
+   subroutine end_step(self)
+      class(row_slider_type), intent(inout) :: self
+
+      real(wp) :: excess(self%blocks), shown(0:max_order), value, slope, bend, drive(0:2), pulled
+      real(wp) :: stiffness
+      integer :: block
+
+      excess = 0.0_wp
+      if (.not. self%has_clocks) call carry_published(self)
+      do block = 1, self%blocks
+         call carry(self, block, self%length - self%moment(block))
+         if (.not. self%block(block)%exceeds) cycle
+         shown(:self%order) = self%published(block, :self%order)
+         call evaluate(shown, self%order, self%length, value, slope, bend)
+         excess(block) = self%place(block) - value
+      end do
+      do block = 1, self%blocks
+         if (.not. self%block(block)%exceeds) cycle
+         if (block > 1) call give_excess(self, block, block - 1, excess(block))
+         if (block < self%blocks) call give_excess(self, block, block + 1, excess(block))
+      end do
+
+      associate (length => self%length, block_mass => 1.0_wp / self%inverse_mass)
+         drive = drive_at(self, 0.0_wp)
+         stiffness = sum(self%pull)
+         pulled = block_mass * (stiffness * length * (drive(0) + length * (0.5_wp * drive(1) &
+            & + length * drive(2) / 3.0_wp)) - self%pulled_once)
+         if (abs(self%drive%acceleration) > 0.0_wp) then
+            call self%drive%earlier_impulse%add(pulled)
+            call self%drive%add_work(drive(1) * pulled + 2.0_wp * drive(2) * block_mass &
+               & * (stiffness * length**2 * (0.5_wp * drive(0) + length * (drive(1) / 3.0_wp &
+               & + 0.25_wp * length * drive(2))) - self%pulled_lever))
+         else
+            call self%drive%impulse%add(pulled)
+         end if
+         call self%drag_loss%add(block_mass * self%drag_part)
+         call self%damping_loss%add(block_mass * self%damping_part)
+         self%offer_moment = self%offer_moment - length
+      end associate
+      if (self%reaches_end) then
+         self%time = self%end_time
+      else
+         self%time = self%time + self%length
+      end if
+      self%base_time = self%time
+      self%moment = 0.0_wp
+      if (self%events > 0) then
+         self%pace = busy_pace
+      else
+         self%pace = min(quiet_pace, 2.0_wp * self%pace)
+      end if
+      self%is_quiet = self%events == 0
+      call self%sum_motion(2)
+   end subroutine end_step
+
+end module mesoslip_sliders_interface_row

@@ -69,8 +69,8 @@ module mesoslip_track_strength
    contains
       !> Factor of the thresholds at a displacement, and g there
       procedure, non_overridable :: factor, relative_strength
-      !> Set the stretches of a contact that attaches. It can be overridden, although nothing does so,
-      !> as the call by the class keeps this rare case out of the innermost loops of sliders.
+      !> Set the stretches of a contact that attaches. It can be overridden, although nothing does
+      !> so, as the call by the class keeps this rare case out of the innermost loops of sliders.
       procedure :: lets_attach
       !> Usual maximum of the factor
       procedure, non_overridable :: usual_max

@@ -189,8 +189,50 @@ def test_uniform_motion_breaks_contacts_where_clocks_do(ratio, changes):
     )
 
 
+def relaxing(force_ratio: float, width: float) -> dict[str, Any]:
+    return {
+        "law": "relax",
+        "time": 2.0,
+        "young_force_ratio": force_ratio,
+        "young_relative_width": width,
+    }
+
+
+@pytest.mark.parametrize(
+    ("ageing", "ratio", "delay"),
+    [
+        ({"law": "log", "time": 1.0, "growth": 0.01}, 0.3, 0.1),
+        (relaxing(1.3, 0.05), 0.05, 0.1),
+        (relaxing(0.9, 0.3), 1.0, 0.0),
+    ],
+    ids=["log", "weaker", "relax"],
+)
+def test_uniform_motion_breaks_ageing_contacts_where_clocks_do(ageing, ratio, delay):
+    """Where thresholds grow so little that no bound is renewed before a contact would break."""
+    uniform, clocked = (
+        breaks(
+            unit(
+                30,
+                run__duration=None,
+                drive={"stage": [{"duration": 60.0, "start_velocity": 0.3, "end_velocity": end}]},
+                contacts__thermal={"rate": 1.0, "force_ratio": ratio},
+                contacts__ageing=ageing,
+                contacts__delay=delay,
+                contacts__back_force_ratio=0.1,
+            )
+        )
+        for end in (0.3, 0.3 * (1.0 + 1e-13))
+    )
+    assert len(uniform) == len(clocked) > 500
+    assert [contact for _, contact in uniform] == [contact for _, contact in clocked]
+    np.testing.assert_allclose(
+        [time for time, _ in uniform], [time for time, _ in clocked], rtol=1e-9
+    )
+
+
+@pytest.mark.parametrize("ageing", [None, {"law": "log", "time": 1.0, "growth": 0.1}])
 @pytest.mark.parametrize("width", [0.0, 0.25])
-def test_uniform_motion_does_not_depend_on_segments(width):
+def test_uniform_motion_does_not_depend_on_segments(width, ageing):
     """The bits of a run in segments of one advance are those of a run in one piece."""
     config = unit(
         200,
@@ -200,6 +242,7 @@ def test_uniform_motion_does_not_depend_on_segments(width):
         contacts__delay=0.1,
         contacts__back_force_ratio=0.1,
         contacts__newborn_width=width,
+        contacts__ageing=ageing,
     )
     origins = []
     for advances in (1, 100_000):

@@ -6,14 +6,19 @@
 !> otherwise it draws another deviate (P. Lewis and G. Shedler, Naval Research Logistics Quarterly
 !> 26 (1979) 403). This is exact and has no time step. The bound of a growing threshold is its last
 !> value; that of a falling one is its value at a later time, when the bound is renewed.
+!>
+!> In a uniform prescribed motion all this is done at birth, as the time at which a contact has a
+!> stretch is known. When the motion changes, a contact that is left draws another deviate: its
+!> hazard from then on does not depend on the one before.
 module mesoslip_contacts_thermal_ageing
    use mesoslip_contacts_ageing_law, only: ageing_law_type, take_ageing_law
    use mesoslip_contacts_base, only: contact_parameters_type, contacts_type
    use mesoslip_contacts_individual_break_tree, only: break_tree_type, new_break_tree
    use mesoslip_contacts_individual_record, only: row_limit, row_origin, row_renewal, row_stiffness
    use mesoslip_contacts_thermal_contacts, only: thermal_contacts_type, initialize_thermal, &
-      & offer_by_clocks
-   use mesoslip_contacts_thermal_keys, only: exchange_thermal, life_left, set_up_keys
+      & offer_thermal
+   use mesoslip_contacts_thermal_keys, only: exchange_thermal, life_key, life_left
+   use mesoslip_contacts_thermal_steady, only: grown, set_up_steady
    use mesoslip_hazard, only: never
    use mesoslip_interface_law, only: interface_law_type, pose_type, window_type
    use mesoslip_numerics_archive, only: archive_type
@@ -31,6 +36,9 @@ module mesoslip_contacts_thermal_ageing
    real(wp), parameter :: tiny_gap = 1.0e-12_wp
    !> Fall of a threshold until its bound is renewed: over f_T, and over the gap to the force
    real(wp), parameter :: max_drop = 0.5_wp, max_gap_part = 0.9_wp
+   !> In a uniform motion: growth of a threshold over f_T until a contact is expected to break,
+   !> above which its bound is renewed before, and the distance from there to that break over f_T/k
+   real(wp), parameter :: max_growth = 0.3_wp, early = 2.0_wp
    !> Number of deviates of a life, after which they repeat
    integer(i8), parameter :: max_attempts = 65535_i8
 
@@ -53,7 +61,9 @@ module mesoslip_contacts_thermal_ageing
    contains
       procedure :: initialize, offer, plan, leave, begin_life, accepts_break, update_bounds, &
          & rebuild, records, exchange, limit_at_birth
-      procedure, non_overridable, private :: set_bound, renew_bound, threshold, mean_of
+      procedure :: start_steadily, end_steadily, solve_newborn, begin_solved
+      procedure, non_overridable, private :: set_bound, threshold, mean_of, draw_attempt, &
+         & solve_break, falling_bound
    end type thermal_ageing_contacts_type
 
 contains
@@ -73,7 +83,7 @@ contains
       self%parameters = common
       call take_ageing_law(self%ageing, self%parameters%law, parameters, error)
       if (allocated(error)) return
-      call set_up_keys(self, parameters, error)
+      call set_up_steady(self, parameters, error)
       if (allocated(error)) return
       allocate (self%age(age_length, common%count), source=0.0_wp, stat=stat)
       if (stat /= 0) then
@@ -102,11 +112,11 @@ contains
       type(interface_law_type), intent(out) :: law
       type(window_type), intent(out) :: window
 
-      call offer_by_clocks(self, pose, law, window)
+      call offer_thermal(self, pose, law, window)
       window%end_time = min(window%end_time, self%order_renewal%first())
    end subroutine offer
 
-   !> There are no schedules, as bounds change with the time.
+   !> Only a uniform motion has schedules, as bounds change with the time.
    subroutine plan(self, pose, limit, schedule)
       class(thermal_ageing_contacts_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
@@ -114,6 +124,8 @@ contains
       type(schedule_type), intent(inout) :: schedule
 
       schedule%is_over = .true.
+      call self%follow_motion(pose)
+      if (self%is_steady) call self%plan_steadily(pose, limit, schedule)
    end subroutine plan
 
    subroutine leave(self, contact)
@@ -195,18 +207,6 @@ contains
       call self%order_renewal%set(contact, self%age(age_renewal, contact))
    end subroutine set_bound
 
-   !> Renew the bound of a contact.
-   subroutine renew_bound(self, contact, pose)
-      class(thermal_ageing_contacts_type), intent(inout) :: self
-      integer, intent(in) :: contact
-      type(pose_type), intent(in) :: pose
-
-      call self%update_deviate(contact)
-      call self%take_out(contact)
-      call self%set_bound(contact, pose)
-      call self%put(contact)
-   end subroutine renew_bound
-
    function accepts_break(self, contact, pose, by_clock)
       class(thermal_ageing_contacts_type), intent(inout) :: self
       integer, intent(in) :: contact
@@ -215,14 +215,12 @@ contains
       logical :: accepts_break
 
       real(wp) :: here, uniform(2)
-      integer(i8) :: attempt
 
       here = self%threshold(contact, pose%time)
       accepts_break = here - abs(pose%displacement - self%record(row_origin, contact)) &
          & <= tiny_gap * self%stretch
       if (by_clock .and. .not. accepts_break) then
-         attempt = int(self%age(age_attempts, contact), i8)
-         call draw(attempt)
+         call self%draw_attempt(contact, 0, self%age(age_attempts, contact), uniform)
          accepts_break = uniform(2) &
             & <= exp(-self%hazard%slope * (here - self%record(row_limit, contact)))
       end if
@@ -230,26 +228,172 @@ contains
          call self%order_renewal%remove(contact)
          return
       end if
-      call self%renew_bound(contact, pose)
-      if (.not. by_clock) return
-      attempt = mod(attempt, max_attempts) + 1_i8
-      self%age(age_attempts, contact) = real(attempt, wp)
-      call draw(attempt)
+      if (by_clock) then
+         self%age(age_attempts, contact) = next_attempt(self%age(age_attempts, contact))
+         call self%draw_attempt(contact, 0, self%age(age_attempts, contact), uniform)
+         self%life(life_left, contact) = -log(uniform(1))
+      else
+         call self%update_deviate(contact)
+      end if
       call self%take_out(contact)
-      self%life(life_left, contact) = -log(uniform(1))
+      call self%set_bound(contact, pose)
       call self%put(contact)
-
-   contains
-
-      !> Draw uniform numbers of an attempt, for its deviate and for its acceptance.
-      subroutine draw(attempt)
-         integer(i8), intent(in) :: attempt
-
-         call uniform_pair(self%parameters%seed, self%parameters%realization, &
-            & int(contact - 1, i8), int(self%record(row_renewal, contact), i8), attempt, uniform)
-      end subroutine draw
-
    end function accepts_break
+
+   !> Number of the attempt after one.
+   pure function next_attempt(attempt) result(next)
+      real(wp), intent(in) :: attempt
+      real(wp) :: next
+
+      next = real(mod(int(attempt, i8), max_attempts) + 1_i8, wp)
+   end function next_attempt
+
+   !> Draw uniform numbers of an attempt, for its deviate and for its acceptance.
+   pure subroutine draw_attempt(self, contact, later, attempt, uniform)
+      class(thermal_ageing_contacts_type), intent(in) :: self
+      !> Number of the contact, and renewals until the life
+      integer, intent(in) :: contact, later
+      real(wp), intent(in) :: attempt
+      real(wp), intent(out) :: uniform(2)
+
+      call uniform_pair(self%parameters%seed, self%parameters%realization, int(contact - 1, i8), &
+         & int(self%record(row_renewal, contact), i8) + later, int(attempt, i8), uniform)
+   end subroutine draw_attempt
+
+   !> Solve where a contact breaks in the uniform motion: its stretch along the motion then [m].
+   subroutine solve_break(self, contact, later, configured, age, stretch, left, attempts, breaking)
+      class(thermal_ageing_contacts_type), intent(in) :: self
+      !> Number of the contact, and renewals until the life
+      integer, intent(in) :: contact, later
+      !> Configured breaking stretch [m], age [s], stretch along the motion [m], remaining deviate
+      real(wp), intent(in) :: configured, age, stretch, left
+      !> Deviates drawn in its life
+      real(wp), intent(inout) :: attempts
+      real(wp), intent(out) :: breaking
+
+      real(wp) :: mean, per_time, now, here, x, rest, bound, until, key, next, later_age, then
+      real(wp) :: uniform(2)
+      logical :: falls, is_renewed
+
+      mean = self%mean_of(contact)
+      falls = self%ageing%falls(configured, mean)
+      associate (slope => self%hazard%slope, speed => abs(self%velocity))
+         per_time = self%hazard%rate / (slope * speed)
+         now = age
+         x = stretch
+         rest = left
+         here = self%ageing%threshold(configured, mean, now)
+         do
+            bound = here
+            until = never
+            if (falls) call self%falling_bound(configured, mean, here - abs(x), now, bound, until)
+            key = self%breaking_stretch(bound, x, rest)
+            next = min(key, bound)
+            if (until < never) next = min(next, x + speed * (until - now))
+            later_age = now + (next - x) / speed
+            then = self%ageing%threshold(configured, mean, later_age)
+            is_renewed = x >= 0.0_wp .and. slope * (then - here) > max_growth &
+               & .and. slope * (next - x) > 2.0_wp * early
+            if (is_renewed) then
+               next = next - early / slope
+               later_age = now + (next - x) / speed
+               then = self%ageing%threshold(configured, mean, later_age)
+            else
+               if (then - abs(next) <= tiny_gap * self%stretch) exit
+               if (.not. next < key) then
+                  call self%draw_attempt(contact, later, attempts, uniform)
+                  if (uniform(2) <= exp(-slope * (then - bound))) exit
+                  attempts = next_attempt(attempts)
+                  call self%draw_attempt(contact, later, attempts, uniform)
+               end if
+            end if
+            if (next < key) then
+               rest = max(0.0_wp, rest - per_time &
+                  & * (grown(slope, bound, next) - grown(slope, bound, x)))
+            else
+               rest = -log(uniform(1))
+            end if
+            x = next
+            now = later_age
+            here = then
+         end do
+      end associate
+      breaking = next
+   end subroutine solve_break
+
+   !> Lower bound on a falling threshold, and the age until which it holds.
+   pure subroutine falling_bound(self, configured, mean, gap, age, bound, until)
+      class(thermal_ageing_contacts_type), intent(in) :: self
+      !> Configured breaking stretch, mean one, gap from the force to the threshold [m]; age [s]
+      real(wp), intent(in) :: configured, mean, gap, age
+      !> The bound [m], present threshold before; the age, not changed if it always holds [s]
+      real(wp), intent(inout) :: bound, until
+
+      real(wp) :: drop, here
+
+      here = bound
+      if (.not. here > configured) return
+      drop = min(max_drop / self%hazard%slope, &
+         & max_gap_part * max(gap, tiny_gap * self%stretch))
+      bound = configured
+      if (.not. here - drop > configured) return
+      until = max(nearest(age, huge(1.0_wp)), -self%ageing%time &
+         & * log((here - drop - configured) / (-self%ageing%deficit(configured, mean))))
+      bound = min(here - drop, self%ageing%threshold(configured, mean, until))
+   end subroutine falling_bound
+
+   subroutine start_steadily(self, contact, pose)
+      class(thermal_ageing_contacts_type), intent(inout) :: self
+      integer, intent(in) :: contact
+      type(pose_type), intent(in) :: pose
+
+      call self%update_deviate(contact)
+      associate (life => self%life(:, contact), age => self%age(:, contact))
+         call self%solve_break(contact, 0, age(age_limit), pose%time - age(age_birth), &
+            & self%direction * (pose%displacement - self%record(row_origin, contact)), &
+            & life(life_left), age(age_attempts), life(life_key))
+         self%record(row_limit, contact) = life(life_key)
+         age(age_renewal) = never
+      end associate
+   end subroutine start_steadily
+
+   subroutine end_steadily(self, contact, pose)
+      class(thermal_ageing_contacts_type), intent(inout) :: self
+      integer, intent(in) :: contact
+      type(pose_type), intent(in) :: pose
+
+      real(wp) :: stretch, uniform(2)
+
+      stretch = pose%displacement - self%record(row_origin, contact)
+      if (.not. abs(stretch) > 0.0_wp) stretch = self%direction
+      associate (attempts => self%age(age_attempts, contact))
+         attempts = next_attempt(attempts)
+         call self%draw_attempt(contact, 0, attempts, uniform)
+      end associate
+      self%life(:life_key, contact) = [merge(1.0_wp, 2.0_wp, stretch > 0.0_wp), &
+         & -log(uniform(1)), never]
+      call self%set_bound(contact, pose)
+   end subroutine end_steadily
+
+   subroutine solve_newborn(self, contact, later, stretch, left, limit, key, attempts)
+      class(thermal_ageing_contacts_type), intent(inout) :: self
+      integer, intent(in) :: contact, later
+      real(wp), intent(in) :: stretch, left
+      real(wp), intent(inout) :: limit
+      real(wp), intent(out) :: key, attempts
+
+      attempts = 1.0_wp
+      call self%solve_break(contact, later, limit, 0.0_wp, stretch, left, attempts, key)
+      limit = key
+   end subroutine solve_newborn
+
+   subroutine begin_solved(self, contact, time, configured, attempts)
+      class(thermal_ageing_contacts_type), intent(inout) :: self
+      integer, intent(in) :: contact
+      real(wp), intent(in) :: time, configured, attempts
+
+      self%age(:, contact) = [time, configured, never, attempts]
+   end subroutine begin_solved
 
    !> Renew the bounds that are due, and break contacts whose thresholds have fallen to their
    !> forces.

@@ -24,14 +24,14 @@ module mesoslip_contacts_thermal_contacts
 
    public :: thermal_contacts_type, make_thermal_contacts
    ! For kinds that extend this one: a call by a component would lose their own procedures.
-   public :: initialize_thermal, offer_by_clocks
+   public :: initialize_thermal, offer_thermal
 
    !> Contacts that break by thermal activation.
    type, extends(thermal_steady_type) :: thermal_contacts_type
    contains
       procedure :: initialize => initialize_thermal
-      procedure :: offer, respond, plan, settle, join, leave, begin_life, accepts_break, &
-         & update_bounds
+      procedure :: offer => offer_thermal
+      procedure :: respond, plan, settle, join, leave, begin_life, accepts_break, update_bounds
       procedure, non_overridable :: break_contact
       procedure, non_overridable, private :: break_and_attach, pass_ahead, break_by_clock, &
          & respond_steadily
@@ -70,7 +70,7 @@ contains
    end subroutine initialize_thermal
 
    !> The law holds until a contact breaks or attaches, or its force changes its sign.
-   subroutine offer(self, pose, law, window)
+   subroutine offer_thermal(self, pose, law, window)
       class(thermal_contacts_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
       type(interface_law_type), intent(out) :: law
@@ -87,7 +87,7 @@ contains
       call self%order(self%ahead)%first(ahead)
       window = self%window_between(-huge(1.0_wp), ahead, self%detached%next_due)
       self%clock%is_used = .false.
-   end subroutine offer
+   end subroutine offer_thermal
 
    subroutine plan(self, pose, limit, schedule)
       class(thermal_contacts_type), intent(inout) :: self

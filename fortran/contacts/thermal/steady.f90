@@ -20,13 +20,15 @@ module mesoslip_contacts_thermal_steady
    implicit none
    private
 
-   public :: thermal_steady_type, set_up_steady
+   public :: thermal_steady_type, set_up_steady, grown
 
    !> Minimum velocity, over f_T/k times omega_0: the displacement of a slower slider does not
    !> resolve the time to rounding
    real(wp), parameter :: min_velocity_ratio = 1.0e-6_wp
-   !> Numbers of a next life: stretch at the threshold, and stretch at which the deviate is used up
-   integer, parameter :: next_limit = 1, next_key = 2, next_length = 2
+   !> Numbers of a next life: stretch at the threshold, stretch at which the deviate is used up,
+   !> configured breaking stretch, and deviates drawn
+   integer, parameter :: next_limit = 1, next_key = 2, next_configured = 3, next_attempts = 4, &
+      & next_length = 4
 
    !> Contacts whose breaking displacements are known in advance if the motion is uniform.
    type, abstract, extends(thermal_lists_type) :: thermal_steady_type
@@ -36,7 +38,11 @@ module mesoslip_contacts_thermal_steady
       real(wp), allocatable, private :: next(:, :)
    contains
       procedure, non_overridable :: follow_motion, join_steadily, plan_steadily, settle_steadily
-      procedure, non_overridable, private :: begin_steady, end_steady, breaking_stretch, list_next
+      procedure, non_overridable :: breaking_stretch
+      !> For one contact: solve where it breaks when a uniform motion begins, continue with the
+      !> clocks when it ends, solve where it will break at birth, and begin that life
+      procedure :: start_steadily, end_steadily, solve_newborn, begin_solved
+      procedure, non_overridable, private :: begin_steady, end_steady, list_next
    end type thermal_steady_type
 
 contains
@@ -85,22 +91,28 @@ contains
       self%velocity = pose%velocity
       self%direction = sign(1.0_wp, pose%velocity)
       do contact = 1, self%parameters%count
-         if (.not. self%record(row_stiffness, contact) > 0.0_wp) cycle
-         call self%update_deviate(contact)
-         self%life(life_key, contact) = self%breaking_stretch(self%record(row_limit, contact), &
-            & self%direction * (pose%displacement - self%record(row_origin, contact)), &
-            & self%life(life_left, contact))
+         if (self%record(row_stiffness, contact) > 0.0_wp) call self%start_steadily(contact, pose)
       end do
       call self%rebuild(pose%displacement)
    end subroutine begin_steady
 
-   !> Order contacts by the clocks again. Their remaining deviates follow from the distances to
-   !> where they would break.
+   !> Solve where a pinned contact breaks as a uniform motion begins.
+   subroutine start_steadily(self, contact, pose)
+      class(thermal_steady_type), intent(inout) :: self
+      integer, intent(in) :: contact
+      type(pose_type), intent(in) :: pose
+
+      call self%update_deviate(contact)
+      self%life(life_key, contact) = self%breaking_stretch(self%record(row_limit, contact), &
+         & self%direction * (pose%displacement - self%record(row_origin, contact)), &
+         & self%life(life_left, contact))
+   end subroutine start_steadily
+
+   !> Order contacts by the clocks again.
    subroutine end_steady(self, pose)
       class(thermal_steady_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
 
-      real(wp) :: stretch, growth
       integer :: contact
 
       self%is_steady = .false.
@@ -111,18 +123,55 @@ contains
       self%hazard%max_exponent = 0.0_wp
       do contact = 1, self%parameters%count
          if (.not. self%record(row_stiffness, contact) > 0.0_wp) cycle
-         stretch = pose%displacement - self%record(row_origin, contact)
-         associate (limit => self%record(row_limit, contact), life => self%life(:, contact))
-            growth = grown(self%hazard%slope, limit, life(life_key)) &
-               & - grown(self%hazard%slope, limit, self%direction * stretch)
-            life(life_left) = max(0.0_wp, growth) * self%hazard%rate &
-               & / (self%hazard%slope * abs(self%velocity))
-            if (.not. abs(stretch) > 0.0_wp) stretch = self%direction
-            life(life_clock) = merge(1.0_wp, 2.0_wp, stretch > 0.0_wp)
-         end associate
+         call self%end_steadily(contact, pose)
          call self%put(contact)
       end do
    end subroutine end_steady
+
+   !> Continue a pinned contact with the clocks as a uniform motion ends. Its remaining deviate
+   !> follows from the distance to where it would break.
+   subroutine end_steadily(self, contact, pose)
+      class(thermal_steady_type), intent(inout) :: self
+      integer, intent(in) :: contact
+      type(pose_type), intent(in) :: pose
+
+      real(wp) :: stretch, growth
+
+      stretch = pose%displacement - self%record(row_origin, contact)
+      associate (limit => self%record(row_limit, contact), life => self%life(:, contact))
+         growth = grown(self%hazard%slope, limit, life(life_key)) &
+            & - grown(self%hazard%slope, limit, self%direction * stretch)
+         life(life_left) = max(0.0_wp, growth) * self%hazard%rate &
+            & / (self%hazard%slope * abs(self%velocity))
+         if (.not. abs(stretch) > 0.0_wp) stretch = self%direction
+         life(life_clock) = merge(1.0_wp, 2.0_wp, stretch > 0.0_wp)
+      end associate
+   end subroutine end_steadily
+
+   !> Solve where a contact will break that attaches in the uniform motion.
+   subroutine solve_newborn(self, contact, later, stretch, left, limit, key, attempts)
+      class(thermal_steady_type), intent(inout) :: self
+      !> Number of the contact, and renewals until that life
+      integer, intent(in) :: contact, later
+      !> First stretch along the motion [m], and deviate
+      real(wp), intent(in) :: stretch, left
+      !> Configured breaking stretch; on return that at the threshold [m]
+      real(wp), intent(inout) :: limit
+      !> Stretch at which its deviate is used up [m], and deviates drawn
+      real(wp), intent(out) :: key, attempts
+
+      key = self%breaking_stretch(limit, stretch, left)
+      attempts = 1.0_wp
+   end subroutine solve_newborn
+
+   !> Begin a life that was solved: nothing more here.
+   subroutine begin_solved(self, contact, time, configured, attempts)
+      class(thermal_steady_type), intent(inout) :: self
+      integer, intent(in) :: contact
+      !> Time [s], configured breaking stretch [m], and deviates drawn
+      real(wp), intent(in) :: time, configured, attempts
+
+   end subroutine begin_solved
 
    !> Hazard from zero stretch to a stretch, in units of omega_0 f_T/(k v), with the sign of the
    !> stretch; slope is k/f_T, and limit the stretch at the threshold.
@@ -161,7 +210,7 @@ contains
       integer, intent(in) :: contact
       type(pose_type), intent(in) :: pose
 
-      real(wp) :: stretch
+      real(wp) :: stretch, configured, attempts
 
       stretch = pose%displacement - self%record(row_origin, contact)
       ! To the last digit as in a schedule.
@@ -170,8 +219,11 @@ contains
          & * self%parameters%back_force_ratio * self%parameters%static_force &
          & / self%record(row_stiffness, contact)
       self%life(life_clock, contact) = merge(1.0_wp, 2.0_wp, self%direction > 0.0_wp)
-      self%life(life_key, contact) = self%breaking_stretch(self%record(row_limit, contact), &
-         & self%direction * stretch, self%life(life_left, contact))
+      configured = self%record(row_limit, contact)
+      call self%solve_newborn(contact, 0, self%direction * stretch, &
+         & self%life(life_left, contact), self%record(row_limit, contact), &
+         & self%life(life_key, contact), attempts)
+      call self%begin_solved(contact, pose%time, configured, attempts)
       call self%insert(contact)
    end subroutine join_steadily
 
@@ -204,12 +256,12 @@ contains
       call self%list_attachments(min(limit, max_events, 2 * number + 4), pose%direction, &
          & schedule, contact)
       call self%draw_deviates(contact(:schedule%attachments), 0_i8)
-      call self%list_next(contact(:schedule%attachments), schedule%attach_stretch, &
+      call self%list_next(contact(:schedule%attachments), 0, schedule%attach_stretch, &
          & schedule%attach_limit)
       call self%list_births(self%steady_listed(:number), 0, pose%direction, schedule)
       if (schedule%has_births) then
          call self%draw_deviates(self%steady_listed(:number), 1_i8)
-         call self%list_next(self%steady_listed(:number), schedule%birth_stretch, &
+         call self%list_next(self%steady_listed(:number), 1, schedule%birth_stretch, &
             & schedule%birth_limit)
       end if
       schedule%is_over = .false.
@@ -217,20 +269,24 @@ contains
 
    !> Solve where contacts with drawn deviates break that attach in a uniform motion with a stretch
    !> [m]; limit is the stretch at the threshold, on return that at breaking [m].
-   subroutine list_next(self, contact, stretch, limit)
+   subroutine list_next(self, contact, later, stretch, limit)
       class(thermal_steady_type), intent(inout) :: self
-      integer, intent(in) :: contact(:)
+      !> Numbers of the contacts, and renewals until those lives
+      integer, intent(in) :: contact(:), later
       real(wp), intent(in) :: stretch(:)
       real(wp), intent(inout) :: limit(:)
 
-      real(wp) :: breaking
       integer :: event
 
       do event = 1, size(contact)
-         breaking = self%breaking_stretch(limit(event), self%direction * stretch(event), &
-            & self%life(life_next, contact(event)))
-         self%next(:, contact(event)) = [limit(event), breaking]
-         limit(event) = min(limit(event), breaking)
+         associate (next => self%next(:, contact(event)))
+            next(next_configured) = limit(event)
+            next(next_limit) = limit(event)
+            call self%solve_newborn(contact(event), later, self%direction * stretch(event), &
+               & self%life(life_next, contact(event)), next(next_limit), next(next_key), &
+               & next(next_attempts))
+            limit(event) = min(next(next_limit), next(next_key))
+         end associate
       end do
    end subroutine list_next
 
@@ -239,7 +295,6 @@ contains
       class(thermal_steady_type), intent(inout) :: self
       type(schedule_type), intent(in) :: schedule
 
-      real(wp) :: key
       integer :: event, attached(max_events)
 
       do event = 1, schedule%broken
@@ -249,17 +304,20 @@ contains
       call self%detach_listed(self%steady_listed(:schedule%broken), schedule)
       call self%attach_listed(schedule, attached)
       do event = 1, schedule%attached
-         associate (contact => attached(event))
-            self%record(row_limit, contact) = self%next(next_limit, contact)
-            key = self%next(next_key, contact)
+         associate (contact => attached(event), next => self%next(:, attached(event)))
             ! As for a contact that attaches outside a schedule, whose force is not known before.
             if (allocated(self%births%force) .or. self%parameters%keeps_thresholds) then
-               key = self%breaking_stretch(self%next(next_limit, contact), self%direction &
+               next(next_limit) = next(next_configured)
+               call self%solve_newborn(contact, 0, self%direction &
                   & * (schedule%attach_displacement(event) - self%record(row_origin, contact)), &
-                  & self%life(life_next, contact))
+                  & self%life(life_next, contact), next(next_limit), next(next_key), &
+                  & next(next_attempts))
             end if
+            self%record(row_limit, contact) = next(next_limit)
             self%life(:, contact) = [merge(1.0_wp, 2.0_wp, self%direction > 0.0_wp), 0.0_wp, &
-               & key, 0.0_wp]
+               & next(next_key), 0.0_wp]
+            call self%begin_solved(contact, schedule%attach_time(event), next(next_configured), &
+               & next(next_attempts))
             call self%insert(contact)
          end associate
       end do

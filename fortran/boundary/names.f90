@@ -6,7 +6,7 @@ module mesoslip_boundary_names
    use mesoslip_contacts_individual_neighbours, only: lattice_names
    use mesoslip_contacts_threshold_laws, only: law_names
    use mesoslip_loop_endings, only: ending_names
-   use mesoslip_loop_state, only: energy_columns
+   use mesoslip_loop_state, only: energy_columns, table_names
    use mesoslip_numerics_errors, only: error_type, raise, status_invalid
    use mesoslip_numerics_parameters, only: name_length
    use mesoslip_recording_avalanches, only: avalanche_columns, snapshot_event_columns
@@ -34,6 +34,8 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       select case (list)
+      case ("tables")
+         names = table_names
       case ("trace")
          names = trace_columns
       case ("slip_trace")

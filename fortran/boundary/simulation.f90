@@ -164,36 +164,33 @@ subroutine ask_contacts(handle, count, values, status, message)
    call report(error, status, message)
 end subroutine ask_contacts
 
-!> Number of rows of a table that can be drained.
-subroutine count_rows(handle, table, columns, rows, status, message)
+!> Numbers of rows that can be drained, for all tables in the order of the list of names "tables".
+subroutine count_rows(handle, columns, rows, status, message)
    !f2py threadsafe
    use mesoslip_boundary_handles, only: error_type, find_simulation, report, simulation_type
-   use mesoslip_numerics_errors, only: raise, status_invalid
+   use mesoslip_loop_state, only: table_names
    use mesoslip_recording_buffer, only: buffer_type
    implicit none
    integer(8), intent(in) :: handle(2)
-   !> Name of the table
-   character(len=*), intent(in) :: table
-   !> Numbers in a row, and rows
-   integer, intent(out) :: columns, rows
+   !> Numbers in a row, and rows, of each table
+   integer, intent(out) :: columns(8), rows(8)
    integer, intent(out) :: status
    character(len=200), intent(out) :: message
 
    type(simulation_type), pointer :: simulation
    type(buffer_type), pointer :: buffer
    type(error_type), allocatable :: error
+   integer :: table
 
    columns = 0
    rows = 0
    call find_simulation(handle, .true., simulation, error)
    if (.not. allocated(error)) then
-      buffer => simulation%table(table)
-      if (associated(buffer)) then
-         columns = size(buffer%row, 1)
-         rows = simulation%rows_to_drain(table)
-      else
-         call raise(error, status_invalid, "unknown table '" // table // "'")
-      end if
+      do table = 1, size(table_names)
+         buffer => simulation%table(table_names(table))
+         columns(table) = size(buffer%row, 1)
+         rows(table) = simulation%rows_to_drain(table_names(table))
+      end do
    end if
    call report(error, status, message)
 end subroutine count_rows

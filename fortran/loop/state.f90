@@ -18,7 +18,7 @@ module mesoslip_loop_state
    private
 
    public :: state_type
-   public :: energy_columns, energy_length
+   public :: energy_columns, energy_length, table_names
 
    !> Terms of the energy balance: work of the drive; energy of the slider and its spring; of the
    !> contacts; losses by damping, by drag, by breaking; gain by attaching; work of steps beyond

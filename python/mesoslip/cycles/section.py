@@ -195,7 +195,7 @@ class Motion:
 
 def _taken(kernel: Kernel) -> tuple[Array, Array]:
     """Drain all tables of a kernel; returns the trace and the slips."""
-    taken = {table: kernel.drain(table) for table in USED_TABLES}
+    taken = kernel.drain(*USED_TABLES)
     return taken["trace"], taken["slips"]
 
 

@@ -203,13 +203,18 @@ class Kernel:
         (values,) = self._call(_core.ask_contacts, count)
         return np.asarray(values)
 
-    def drain(self, table: str) -> Array:
-        """Remove the recorded rows of a table and return them, shape (rows, columns)."""
-        columns, rows = self._call(_core.count_rows, table)
-        values = np.empty((rows, columns))
-        if rows:
-            self._call(_core.drain_rows, table, values.T)
-        return values
+    def drain(self, *tables: str) -> dict[str, Array]:
+        """Remove the recorded rows of some tables; returns them by table, shape (rows, columns)."""
+        drained = {}
+        counts = self._call(_core.count_rows)
+        for table, columns, rows in zip(
+            TABLE_NAMES, *(one.tolist() for one in counts), strict=True
+        ):
+            if table in tables:
+                drained[table] = values = np.empty((rows, columns))
+                if rows:
+                    self._call(_core.drain_rows, table, values.T)
+        return drained
 
     def save(self) -> Words:
         """The whole state, from which another simulation with the same parts can continue."""
@@ -238,3 +243,7 @@ def name_list(which: str) -> tuple[str, ...]:
     """A list of names that the kernels define: the columns of a table, or kinds of parts."""
     names, count = checked(_core.list_names(which, MAX_NAMES))
     return tuple(str(name) for name in np.char.strip(np.char.decode(names[:count])))
+
+
+# Tables that a simulation records.
+TABLE_NAMES = name_list("tables")

@@ -341,8 +341,8 @@ class Realization(Recorded):
         """Take the recorded rows and the progress of the kernel."""
         progress = self._start.progress_since(kernel.ask())
         with self._lock:
-            for table in self._recorded:
-                values = self._start.rows_since(table, kernel.drain(table))
+            for table, rows in kernel.drain(*self._recorded).items():
+                values = self._start.rows_since(table, rows)
                 if len(values):
                     self._tables.setdefault(table, Rows(values.shape[1])).add(values)
             self.time = progress.time

@@ -165,15 +165,16 @@ subroutine ask_contacts(handle, count, values, status, message)
 end subroutine ask_contacts
 
 !> Numbers of rows that can be drained, for all tables in the order of the list of names "tables".
-subroutine count_rows(handle, columns, rows, status, message)
+subroutine count_rows(handle, tables, columns, rows, status, message)
    !f2py threadsafe
    use mesoslip_boundary_handles, only: error_type, find_simulation, report, simulation_type
    use mesoslip_loop_state, only: table_names
    use mesoslip_recording_buffer, only: buffer_type
    implicit none
    integer(8), intent(in) :: handle(2)
-   !> Numbers in a row, and rows, of each table
-   integer, intent(out) :: columns(8), rows(8)
+   !> Number of tables; numbers in a row, and rows, of each
+   integer, intent(in) :: tables
+   integer, intent(out) :: columns(tables), rows(tables)
    integer, intent(out) :: status
    character(len=200), intent(out) :: message
 
@@ -186,7 +187,7 @@ subroutine count_rows(handle, columns, rows, status, message)
    rows = 0
    call find_simulation(handle, .true., simulation, error)
    if (.not. allocated(error)) then
-      do table = 1, size(table_names)
+      do table = 1, min(tables, size(table_names))
          buffer => simulation%table(table_names(table))
          columns(table) = size(buffer%row, 1)
          rows(table) = simulation%rows_to_drain(table_names(table))

@@ -206,7 +206,7 @@ class Kernel:
     def drain(self, *tables: str) -> dict[str, Array]:
         """Remove the recorded rows of some tables; returns them by table, shape (rows, columns)."""
         drained = {}
-        counts = self._call(_core.count_rows)
+        counts = self._call(_core.count_rows, len(TABLE_NAMES))
         for table, columns, rows in zip(
             TABLE_NAMES, *(one.tolist() for one in counts), strict=True
         ):

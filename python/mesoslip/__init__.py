@@ -5,6 +5,12 @@
 >>> tree["spring_force"].plot()                   # doctest: +SKIP
 """
 
+import sys
+
+# As a program, not as a library, it answers Ctrl-C from its first import on.
+if sys.argv[:1] == ["-m"] or "".join(sys.argv[:1]).endswith("/mesoslip"):
+    import mesoslip._start  # noqa: F401
+
 import lazy_loader
 
 # Names are in the stub beside this file, and are imported at first use.

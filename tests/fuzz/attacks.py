@@ -436,7 +436,7 @@ def signals(name: str, folder: Path) -> Report:
     is_killed = signal.SIGKILL in sent or printed.status < 0
     if is_killed:
         # Whose end nothing can tidy up after.
-        wanted |= {path.name for path in folder.glob(f".{process.pid}-*")}
+        wanted |= {path.name for path in folder.glob(f".mesoslip-*-{process.pid}-*")}
     problems += [f"left over: {one}, {which}" for one in left_over(folder, wanted)]
     expected = read(store / f"{which}.nc")
     if (folder / "out.partial.nc").exists():

@@ -97,10 +97,13 @@ ARGUMENTS = {
     "deep": lambda wrong: CONFIG.model_copy(deep=wrong),
     "rate": lambda wrong: mesoslip.SteadySliding(CONFIG).response_at(wrong),
     "fit": lambda wrong: mesoslip.response("none.nc", fit=wrong),
+    "saved": lambda wrong: mesoslip.Realization(CONFIG).restore(wrong, {}),
     "find_multipliers": lambda wrong: mesoslip.cycle(CONFIG, find_multipliers=wrong),
     "estimates_errors": lambda wrong: mesoslip.Realization(CONFIG, estimates_errors=wrong),
     "letters": lambda wrong: mesoslip.plot("none.nc", letters=wrong),
     "view": lambda wrong: mesoslip.plot("none.nc", view=wrong),
+    "title": lambda wrong: mesoslip.plot("none.nc", title=wrong),
+    "x": lambda wrong: mesoslip.plot("none.nc", x=wrong),
     "table": lambda wrong: mesoslip.Realization(CONFIG).table(wrong),
 }
 # Those for which a value that is wrong elsewhere is right.
@@ -124,6 +127,21 @@ def test_wrong_arguments_are_named(name, wrong):
 def test_numbers_are_finite(name, wrong):
     with pytest.raises(MesoslipError, match=f"{name} = .*: must be a finite number"):
         ARGUMENTS[name](wrong)
+
+
+@pytest.mark.parametrize("wrong", [0, math.nan, [1.0, math.inf]])
+def test_rates_of_oscillations_are_finite_and_not_0(wrong):
+    sliding = mesoslip.SteadySliding(CONFIG)
+    with pytest.raises(MesoslipError, match=r"frequency = .*: must be finite numbers other than 0"):
+        sliding.response(wrong)
+    with pytest.raises(MesoslipError, match=r"rate = .*: must be finite numbers other than 0"):
+        sliding.response_at(wrong)
+
+
+def test_realizations_without_snapshots_have_none_of_them():
+    with pytest.raises(MesoslipError, match="config = 5: must be a Config"):
+        mesoslip.Realization.all_of(5)
+    assert mesoslip.Realization(CONFIG).snapshots.shape == (0, 0, 3)
 
 
 def test_catalogues_group_by_realization():

@@ -13,6 +13,7 @@ import subprocess
 import sys
 
 import mesoslip
+import mesoslip.__main__ as program
 import numpy as np
 import pytest
 import tomli_w
@@ -522,7 +523,7 @@ def test_a_matplotlibrc_of_the_current_folder_is_not_read(module, content, tmp_p
     assert (done.returncode, done.stderr) == (0, "")
 
 
-@pytest.mark.parametrize("module", ["mesoslip.command_line.main", "typer"])
+@pytest.mark.parametrize("module", ["lazy_loader", "mesoslip.command_line.main", "typer"])
 def test_an_interrupted_start_ends_without_a_traceback(module):
     code = f"""
 import os, runpy, signal, sys
@@ -532,8 +533,22 @@ class Interrupt:
         if name == {module!r}:
             os.kill(os.getpid(), signal.SIGINT)
 sys.meta_path.insert(0, Interrupt())
-sys.argv[1:] = ["--version"]
+sys.argv = ["/usr/bin/mesoslip", "--version"]
 runpy.run_module("mesoslip", run_name="__main__")
 """
     done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True)
     assert (done.returncode, done.stdout, done.stderr) == (130, b"", b"")
+
+
+def test_an_interrupt_behind_another_error_ends_the_program(monkeypatch):
+    """Such as in the names of a class, where Python raises an error of its own."""
+
+    def interrupted():
+        try:
+            raise KeyboardInterrupt
+        except KeyboardInterrupt as error:
+            raise RuntimeError from error
+
+    monkeypatch.setattr(program, "main", interrupted)
+    with pytest.raises(SystemExit, match="130"):
+        program.start()

@@ -130,7 +130,27 @@ def array(value: Any, kinds: str = "fiu") -> Any:
         raise ValueError("must be a number, or an array of numbers") from None
 
 
-complex_array = functools.partial(array, kinds="fiuc")
+def finite_array(value: Any) -> Any:
+    """Finite numbers of any shape."""
+    import numpy as np
+
+    found = array(value)
+    if not np.isfinite(found).all():
+        raise ValueError("must be a finite number, or an array of finite numbers")
+    return found
+
+
+def rates(value: Any, kinds: str = "fiuc") -> Any:
+    """Finite rates of any shape, other than 0."""
+    import numpy as np
+
+    found = array(value, kinds)
+    if not (np.isfinite(found) & (found != 0)).all():
+        raise ValueError("must be finite numbers other than 0")
+    return found
+
+
+frequencies = functools.partial(rates, kinds="fiu")
 
 
 def flag(value: Any) -> bool:

@@ -106,6 +106,7 @@ class Config(Table):
         except ConfigError:
             return None
 
+    @arguments.checked(change=arguments.function)
     def adapted(self, change: Callable[[Config], Config]) -> Config:
         """The configuration after a change by the program, which its base has too.
 

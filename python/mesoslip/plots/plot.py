@@ -31,7 +31,9 @@ from mesoslip.plots.views.base import Options
 FEW_TICKS = 4
 
 
-@arguments.checked(view=arguments.text, letters=arguments.flag)
+@arguments.checked(
+    view=arguments.text, x=arguments.text, title=arguments.text, letters=arguments.flag
+)
 def plot(
     output: OutputLike | Sequence[OutputLike],
     file: PathLike | None = None,

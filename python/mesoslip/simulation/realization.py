@@ -194,6 +194,7 @@ class Realization(Recorded):
         self._lock = threading.Lock()
 
     @classmethod
+    @arguments.checked(config=arguments.instance(Config, "a Config"))
     def all_of(cls, config: Config, numbers: Iterable[int] | None = None) -> list[Realization]:
         """All realizations of a configuration, or some of them, which share what they have in
         common."""
@@ -461,6 +462,7 @@ class Realization(Recorded):
         counts = {table: len(rows) for table, rows in self._tables.items()}
         return Saved(scalars, counts, words)
 
+    @arguments.checked(saved=arguments.instance(Saved, "what save returns"), tables=arguments.table)
     def restore(self, saved: Saved, tables: dict[str, Rows]) -> None:
         """Continue from a checkpoint, with the rows that were recorded until then."""
         for name in SAVED_ATTRIBUTES:

@@ -188,7 +188,8 @@ class SnapshotRows:
         return len(self._rows)
 
     def _shaped(self, values: Array) -> Array:
-        shaped = values.reshape(len(values), -1, len(SNAPSHOT_NUMBERS))
+        contacts = values.size // (len(SNAPSHOT_NUMBERS) * max(1, len(values)))
+        shaped = values.reshape(len(values), contacts, len(SNAPSHOT_NUMBERS))
         return np.where(shaped > DETACHED, np.nan, shaped)
 
     def blocks(self, max_rows: int) -> Iterator[Array]:

@@ -160,7 +160,7 @@ class LinearStability(abc.ABC):
     def is_passive(self) -> bool:
         """Whether the force of steady contacts does not depend on the motion of the slider."""
 
-    @arguments.checked(frequency=arguments.array)
+    @arguments.checked(frequency=arguments.frequencies)
     def response(self, frequency: ArrayLike) -> Complex:
         """Λ(iω): contact force over displacement, of a slider moved at frequencies ω [N/m].
 
@@ -169,7 +169,7 @@ class LinearStability(abc.ABC):
         """
         return self.response_at(1j * np.asarray(frequency, dtype=float))
 
-    @arguments.checked(rate=arguments.complex_array)
+    @arguments.checked(rate=arguments.rates)
     def response_at(self, rate: ArrayLike) -> Complex:
         """Λ(λ) for complex rates λ other than 0 [N/m]."""
         values = np.asarray(rate, dtype=np.complex128)

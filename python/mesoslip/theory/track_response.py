@@ -85,7 +85,7 @@ class TrackResponse:
         self._speed = 0.0 if config.slider.ignores_delay else config.drive_speed
         self._delays = delay_law(config)
 
-    @arguments.checked(wavenumber=arguments.array)
+    @arguments.checked(wavenumber=arguments.finite_array)
     def response(self, wavenumber: ArrayLike) -> Complex:
         """χ(q) [N] at wavenumbers q [1/m]: strength 1 + w e^(iqX) gives the force F + w χ e^(iqX).
 
@@ -118,7 +118,7 @@ class TrackResponse:
         change: Complex = released - broken / (pinned + waiting) * borne
         return change * (self._static / mean)
 
-    @arguments.checked(wavenumber=arguments.array)
+    @arguments.checked(wavenumber=arguments.finite_array)
     def strength_spectrum(self, wavenumber: ArrayLike) -> Array:
         """Spectral density G(q) of the strength over w² [m]; its integral over all q is 1."""
         reach = np.asarray(wavenumber, dtype=float) * self.track.length
@@ -126,7 +126,7 @@ class TrackResponse:
             return self.track.length / math.sqrt(2 * math.pi) * np.exp(-(reach**2) / 2)
         return np.asarray(self.track.length / math.pi / (1 + reach**2))
 
-    @arguments.checked(wavenumber=arguments.array)
+    @arguments.checked(wavenumber=arguments.finite_array)
     def force_spectrum(self, wavenumber: ArrayLike) -> Array:
         """Spectral density w² abs(χ)² G of the force [N² m]; its integral over all q is the
         variance."""

@@ -35,6 +35,9 @@ def test_reciprocating():
     x, y = (tree[one].values[0][inside] for one in ("drive_displacement", "spring_force"))
     area = abs(float(np.sum(0.5 * (y + np.roll(y, -1)) * (np.roll(x, -1) - x))))
     assert found.columns["cycles"]["loop_energy"][5] == pytest.approx(area, rel=1e-3)
+    steady = mesoslip.response(tree)["steady"]
+    assert steady["steady_force"].values == pytest.approx(found.overall["mean_friction"].mean)
+    assert "mesoslip strokes" in steady["note"].item()
 
 
 def test_stribeck():

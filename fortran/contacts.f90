@@ -36,14 +36,14 @@ contains
       call take_contact_parameters(common, parameters, seed, realization, error)
       if (allocated(error)) return
       if (parameters%has("blocks")) then
-         call make_row(contacts, kind, common, parameters, error)
+         call new_row(contacts, kind, common, parameters, error)
       else
-         call make_kind(contacts, kind, common, parameters, error)
+         call new_contacts_of_kind(contacts, kind, common, parameters, error)
       end if
    end subroutine make_contacts
 
    !> Set up the contacts of each block of a row.
-   subroutine make_row(contacts, kind, common, parameters, error)
+   subroutine new_row(contacts, kind, common, parameters, error)
       class(contacts_type), allocatable, intent(out) :: contacts
       character(len=*), intent(in) :: kind
       !> Parameters of all contacts together
@@ -78,16 +78,16 @@ contains
          ! The blocks go along one track.
          own%strength%origin = common%strength%origin + (block - 1) * spacing
          others = parameters
-         call make_kind(row%block(block)%contacts, kind, own, others, error)
+         call new_contacts_of_kind(row%block(block)%contacts, kind, own, others, error)
          if (allocated(error)) return
          row%has_clocks = row%block(block)%contacts%has_clocks
          row%keeps_offers = row%block(block)%contacts%keeps_offers
       end do
       call move_alloc(row, contacts)
-   end subroutine make_row
+   end subroutine new_row
 
    !> Set up contacts of a kind from the parameters that all kinds have and those of its own.
-   subroutine make_kind(contacts, kind, common, parameters, error)
+   subroutine new_contacts_of_kind(contacts, kind, common, parameters, error)
       class(contacts_type), allocatable, intent(out) :: contacts
       character(len=*), intent(in) :: kind
       type(contact_parameters_type), intent(in) :: common
@@ -116,6 +116,6 @@ contains
       case default
          call raise(error, status_invalid, "unknown kind of contacts '" // kind // "'")
       end select
-   end subroutine make_kind
+   end subroutine new_contacts_of_kind
 
 end module mesoslip_contacts

@@ -1,5 +1,6 @@
 from .analysis.avalanches import avalanche_summary, avalanches
 from .analysis.catalogue_tables import write_table
+from .analysis.events import events
 from .analysis.export import export
 from .analysis.lyapunov import lyapunov
 from .analysis.plateaus import plateaus
@@ -53,6 +54,7 @@ __all__ = [
     "curve",
     "cycle",
     "derived",
+    "events",
     "example",
     "export",
     "fit",

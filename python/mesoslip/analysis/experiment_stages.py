@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from mesoslip.analysis.apparatus import apparatus_of
 from mesoslip.analysis.steady_force import SteadyMean, steady_mean
 from mesoslip.analysis.stick_phases import relieved_loading
+from mesoslip.analysis.strokes import output_pieces
 from mesoslip.configuration.drive import DrivePart
 from mesoslip.errors import FileError
 from mesoslip.output.access import group_of, is_measured
@@ -201,6 +202,14 @@ class Experiment:
         changed = copy.copy(self)
         changed.apparatus = dataclasses.replace(self.apparatus, stiffness=stiffness)
         return changed
+
+    @cached_property
+    def has_strokes(self) -> bool:
+        """Whether it is a trace in strokes that its stages do not follow."""
+        if not self.is_measured:
+            return False
+        pieces = output_pieces(self.tree)[0]
+        return pieces is not None and len(self.stages) < len(pieces) / 2
 
     @property
     def is_measured(self) -> bool:

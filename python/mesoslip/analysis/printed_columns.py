@@ -13,6 +13,8 @@ from mesoslip.quantities import column
 
 # Significant digits of columns without errors, and of times.
 DIGITS, TIME_DIGITS = 4, 7
+# Maximum ratio of numbers in a column with the same decimals.
+MAX_RANGE = 100.0
 
 
 def printed_columns(
@@ -40,6 +42,11 @@ def printed_columns(
         digits = TIME_DIGITS if name == "start_time" else DIGITS
         shown = column(values.tolist(), unit_of(unit), digits)
         errors = columns.get(f"{name}_error", np.full(values.size, np.nan))
+        sizes = np.abs(values[np.isfinite(values) & (values != 0)])
+        if f"{name}_error" not in columns and not name.endswith("_time") and sizes.size:
+            # Over decades each number has its own digits.
+            wide = float(sizes.max()) > MAX_RANGE * float(sizes.min())
+            shown = shown._replace(decimals=None if wide else shown.decimals)
         texts = map(shown.text, values.tolist(), errors.tolist())
         cells.append((shown.head(head), *texts))
     names, *rows = zip(*cells, strict=True)

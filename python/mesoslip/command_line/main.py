@@ -20,6 +20,7 @@ from mesoslip.array_packages import import_xarray
 from mesoslip.command_line import (
     catalogues,
     cycle,
+    events,
     example,
     explore,
     export,
@@ -54,6 +55,7 @@ COMMANDS = (
     catalogues.slips,
     catalogues.avalanches,
     catalogues.regime,
+    events.events,
     response.response,
     strokes.strokes,
     plateaus.plateaus,

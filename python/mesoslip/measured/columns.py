@@ -40,6 +40,7 @@ EXAMPLES = {
     "torque": "torque [N m]",
     "radius": "radius [mm]",
     "sliding_speed": "sliding_speed [m/s]",
+    "acoustic_emission": "acoustic_emission [V]",
 }
 # Other names in the headers of options and tables.
 OTHER_NAMES = {
@@ -195,7 +196,7 @@ def _names(headers: Sequence[str]) -> str:
 def _size(unit: str, quantity: str, header: str) -> tuple[float, str]:
     """Size of a unit, and doubts about it; a ValueError if it has another dimension."""
     si, right = QUANTITIES[quantity], f"write it as {EXAMPLES[quantity]!r}"
-    if not unit and si == "1":
+    if not unit and si in {"1", "V"}:
         return 1.0, ""
     if not unit and quantity == "time":
         return 1.0, f"{shown(header)} has no unit: taken as seconds"

@@ -141,6 +141,8 @@ class Columns(Table):
     """Number of revolutions of a disc."""
     rotation_speed: ColumnField = None
     """Speed of its rotation, in revolutions per time."""
+    acoustic_emission: ColumnField = None
+    """A second channel, such as acoustic emission or its trigger; a voltage, or plain numbers."""
     torque: ColumnField = None
     """Torque of the friction, a force with the radius."""
     radius: ColumnField = None

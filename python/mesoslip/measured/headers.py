@@ -23,6 +23,7 @@ QUANTITIES = {
     "torque": "N*m",
     "radius": "m",
     "sliding_speed": "m/s",
+    "acoustic_emission": "V",
 }
 # A displacement, of the load point or of the slider.
 EITHER = "either"
@@ -60,6 +61,8 @@ NAMES = {
     "|turns",
     "rotation_speed": "rotation speed|rotational speed|speed of rotation|spindle speed"
     "|rotation frequency|rpm|drehzahl|angular velocity|angular speed",
+    "acoustic_emission": "acoustic emission|ae|ae rms|ae signal|acoustic|acoustic signal|trigger"
+    "|piezo|hydrophone|microphone",
     "torque": "torque|friction torque|frictional torque|moment|drehmoment|reibmoment|mz|tz",
     "radius": "radius|track radius|wear track radius|disc radius|disk radius|mean radius",
     "sliding_speed": "sliding speed|sliding velocity|speed|velocity|linear speed|linear velocity"

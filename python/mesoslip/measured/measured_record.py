@@ -32,6 +32,7 @@ OTHERS = (
     "revolutions",
     "rotation_speed",
     "sliding_speed",
+    "acoustic_emission",
 )
 WORDS = {
     "load_point": "load point",
@@ -41,6 +42,7 @@ WORDS = {
     "normal_stress": "normal stress",
     "rotation_speed": "rotation speed",
     "sliding_speed": "sliding speed",
+    "acoustic_emission": "acoustic emission",
 }
 
 
@@ -79,6 +81,8 @@ class Record:
     """Revolutions per second."""
     sliding_speed: Array | None
     """Speed of sliding [m/s]."""
+    acoustic_emission: Array | None
+    """A second channel [V], or plain numbers."""
     columns: Sequence[RecordedColumn]
     """All columns of numbers of the file, with the rows that are not used."""
     report: Sequence[str]

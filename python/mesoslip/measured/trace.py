@@ -468,6 +468,7 @@ def _tree(
         "revolutions": record.revolutions,
         "rotation_speed": record.rotation_speed,
         "sliding_speed": record.sliding_speed,
+        "acoustic_emission": record.acoustic_emission,
     }
     if not record.is_friction and record.normal_force is not None:
         traces["friction_coefficient"] = record.force / _pressing(record.normal_force)

@@ -98,6 +98,7 @@ MEASURED = Group(
     revolutions=Meaning("1", "number of revolutions of the disc"),
     rotation_speed=Meaning("s-1", "revolutions of the disc per time"),
     sliding_speed=Meaning("m s-1", "speed of sliding"),
+    acoustic_emission=Meaning("V", "acoustic emission, or another second channel"),
 )
 FORCES = ("spring_force", "friction_coefficient")
 

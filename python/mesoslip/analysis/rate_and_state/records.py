@@ -36,6 +36,7 @@ MAX_STAGES = 200
 MIN_STRETCHES, MAX_STRETCHES = 0.03, 3.0
 
 NO_CHANGE = "no step and no hold after sliding at constant velocity: no data for a, b and D_c"
+STROKES = "goes back and forth: mesoslip strokes has friction, loops and stiffness"
 REVERSES = "the drive reverses: ln V is not defined"
 
 
@@ -72,6 +73,8 @@ def records_of(experiment: Experiment, *, free_stiffness: bool = False) -> list[
 
 def _of_trace(experiment: Experiment) -> list[Record] | str:
     stages = experiment.stages
+    if experiment.has_strokes:
+        return STROKES
     changes = [
         index
         for index, one in enumerate(stages[:-1])

@@ -10,6 +10,8 @@ from mesoslip.analysis.experiment_stages import Experiment, Stage
 from mesoslip.analysis.response.columns import STEADY, empty_row
 from mesoslip.analysis.response.line import Line, line
 from mesoslip.analysis.steady_force import SteadyMean
+from mesoslip.analysis.strokes import strokes_of
+from mesoslip.errors import FileError
 
 if TYPE_CHECKING:
     from mesoslip.output.arrays import Arrays
@@ -25,6 +27,8 @@ def steady_rows(experiment: Experiment, number: int) -> list[dict[str, Any]]:
     number
         Its number.
     """
+    if experiment.has_strokes:
+        return _stroke_rows(experiment, number)
     rows = []
     for stage in experiment.stages:
         if not stage.is_steady:
@@ -52,6 +56,32 @@ def steady_rows(experiment: Experiment, number: int) -> list[dict[str, Any]]:
             row["note"] = _note(experiment, stage, mean)
         rows.append(row)
     return rows
+
+
+def _stroke_rows(experiment: Experiment, number: int) -> list[dict[str, Any]]:
+    """The mean friction over the strokes of a trace, as one row."""
+    try:
+        found = strokes_of(experiment.tree, name=experiment.name, realization=0)
+    except FileError:
+        return []
+    mean = found.overall.get("mean_friction")
+    if mean is None:
+        return []
+    row = empty_row(STEADY, number, experiment.stages[0])
+    columns = found.columns["strokes"]
+    row |= {
+        "stage_start_time": float(columns["start_time"][0]),
+        "velocity": float(np.nanmean(columns["velocity"])),
+        "steady_force": mean.mean,
+        "steady_force_error": mean.error,
+        "steady_force_half_width": 1.96 * mean.error,
+        "sample_count": sum(one.piece.size for one in found.strokes[0]),
+        "effective_sample_count": float(mean.cycles),
+        "is_steady": 1,
+        "is_resolved": 1,
+        "note": f"sliding in {columns['start_time'].size} strokes, each in mesoslip strokes",
+    }
+    return [row]
 
 
 def _note(experiment: Experiment, stage: Stage, mean: SteadyMean) -> str:

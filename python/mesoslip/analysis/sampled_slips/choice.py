@@ -51,12 +51,12 @@ class SlipCounts:
         """The counts with those of another minimum fall, such as a given one."""
         rest = self.threshold != threshold
         at = int(np.searchsorted(self.threshold[rest], threshold))
-        columns = (
-            (self.threshold, threshold),
-            (self.count, count),
-            (self.mirrored_count, mirrored_count),
+        return SlipCounts(
+            np.insert(self.threshold[rest], at, threshold),
+            np.insert(self.count[rest], at, count),
+            np.insert(self.mirrored_count[rest], at, mirrored_count),
+            self.plateau,
         )
-        return SlipCounts(*(np.insert(one[rest], at, new) for one, new in columns), self.plateau)
 
 
 class Choice(NamedTuple):

@@ -1,0 +1,80 @@
+"""Events of a second channel, such as acoustic emission: a trigger, or peaks above the noise."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mesoslip.errors import FileError
+from mesoslip.output.arrays import Tree
+
+Array = NDArray[np.float64]
+
+CHANNEL = "acoustic_emission"
+# Threshold over the standard deviation of the noise: chance exceeds it once in 10^9 samples.
+THRESHOLD = 6.0
+# Median of the absolute value of a standard normal deviate.
+NORMAL_MEDIAN = 0.6744897501960817
+# Maximum number of values of a trigger, and samples below the threshold that end an event.
+TRIGGER_VALUES, DEAD_SAMPLES = 3, 10
+
+
+@dataclass(frozen=True)
+class Emissions:
+    """Events of a channel, each array of shape (events,)."""
+
+    start_time: Array
+    end_time: Array
+    amplitude: Array
+    """Maximum above the median, in the unit of the channel."""
+    energy: Array
+    """Integral of the square above the median."""
+    threshold: float
+    is_trigger: bool
+
+
+def emissions_of(tree: Tree, threshold: float | None = None, dead_time: float = 0.0) -> Emissions:
+    """Events of the channel of an output.
+
+    A channel of two or three values is a trigger, whose events are between its edges. Of others the
+    distance from the median is an event where it exceeds a threshold, by default 6 standard
+    deviations of the noise. Samples closer than the dead time [s], at least 10 samples, belong to
+    one event.
+    """
+    if CHANNEL not in tree.data_vars:
+        raise FileError(
+            "the output has no second channel: trace --columns 'time [s], force [N], "
+            "acoustic_emission [V]' reads one"
+        )
+    root = tree.to_dataset()
+    time, values = root["time"].values, root[CHANNEL].values[0].astype(float)
+    known = np.isfinite(values)
+    time, values = time[known], values[known]
+    size = np.abs(values - np.median(values))
+    is_trigger = np.unique(values).size <= TRIGGER_VALUES
+    if threshold is None:
+        noise = float(np.median(size)) / NORMAL_MEDIAN
+        threshold = 0.5 * float(size.max()) if is_trigger else THRESHOLD * noise
+    above = np.flatnonzero(size > threshold)
+    step = float(np.median(np.diff(time))) if time.size > 1 else 0.0
+    rest = 1.5 * step if is_trigger else max(dead_time, DEAD_SAMPLES * step)
+    if not above.size:
+        none = np.empty(0)
+        return Emissions(none, none, none, none, threshold, is_trigger)
+    cuts = np.flatnonzero(np.diff(time[above]) > rest) + 1
+    first, last = above[np.append(0, cuts)], above[np.append(cuts - 1, above.size - 1)]
+    weights = size**2 * np.gradient(time)
+    total = np.concatenate([[0.0], np.cumsum(weights)])
+    return Emissions(
+        time[first],
+        time[last],
+        np.maximum.reduceat(np.append(size, -math.inf), np.stack([first, last + 1], 1).ravel())[
+            ::2
+        ],
+        total[last + 1] - total[first],
+        threshold,
+        is_trigger,
+    )

@@ -1,0 +1,77 @@
+"""``mesoslip events``."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from mesoslip.command_line.options import (
+    JsonOption,
+    LatexOption,
+    OutputArgument,
+    TableOption,
+    print_json,
+    print_tables,
+    write_table,
+)
+
+
+def events(
+    output: OutputArgument,
+    table: TableOption = None,
+    as_json: JsonOption = False,
+    as_latex: LatexOption = False,
+    catalogue: Annotated[
+        str | None,
+        typer.Option(
+            "--of",
+            help="Catalogue: slips, avalanches, or channel, the last of these by default",
+            metavar="CATALOGUE",
+        ),
+    ] = None,
+    threshold: Annotated[
+        float | None,
+        typer.Option(
+            min=0,
+            help="Minimum amplitude of an event of the channel; from its noise by default",
+            metavar="NUMBER",
+        ),
+    ] = None,
+    completeness: Annotated[
+        float | None,
+        typer.Option(help="Minimum log10(size) of the b-value; found by default", metavar="NUMBER"),
+    ] = None,
+    main_size: Annotated[
+        float | None,
+        typer.Option(
+            min=0, help="Minimum size of main events; the largest 5 % by default", metavar="SIZE"
+        ),
+    ] = None,
+) -> None:
+    """Print the b-value and Omori's decay of events, and acoustic emission beside slips."""
+    from mesoslip.analysis import events as analysis
+    from mesoslip.output import files, targets
+    from mesoslip.output.table_files import latex
+
+    analysis.check_catalogue("--of", catalogue)
+    if table is not None:
+        targets.check_writable(table, [output])
+    with files.opened_arrays(output) as tree:
+        found = analysis.events_of(
+            tree,
+            catalogue,
+            threshold=threshold,
+            completeness=completeness,
+            main_size=main_size,
+            name=str(output),
+        )
+    write_table(table, lambda: found.tables, found.write_csv)
+    if as_json:
+        print_json(found.to_json())
+    elif as_latex:
+        typer.echo(latex(found.tables[0]))
+    else:
+        for note in found.notes:
+            typer.echo(note)
+        print_tables(found.tables)

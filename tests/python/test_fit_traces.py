@@ -338,7 +338,7 @@ def test_traces_may_share_their_track():
     assert np.max(np.abs(one - other)) > 50 * NOISE
     tables["fit"]["shared_track"] = True
     later = xr.DataTree(measured(experiment()).to_dataset().isel(time=slice(900, None)))
-    with pytest.raises(FileError, match="its place on the track is unknown"):
+    with pytest.raises(FileError, match="at an unknown place on the track"):
         prepare_all([later], ["a"], Plan.from_dict(tables))
 
 

@@ -37,6 +37,8 @@ class Quantity:
 
     @property
     def verdict(self) -> str:
+        if not np.isfinite(self.measured):
+            return "not defined"
         low, middle, high = np.nanpercentile(self.predicted, [5, 50, 95])
         if self.kind == "":
             is_wide = high > WIDE[""] * low
@@ -49,6 +51,8 @@ class Quantity:
         return "not decided" if is_wide else "met"
 
     def row(self) -> str:
+        if not np.isfinite(self.measured):
+            return f"| {self.name} | | | | {self.verdict} |"
         low, middle, high = np.nanpercentile(self.predicted, [5, 50, 95])
         shown = [format(one, self.digits) for one in (self.measured, middle, low, high)]
         return (

@@ -161,7 +161,7 @@ class Plan:
         level_width, level_of = reader.level(table)
         after = reader.after(table)
         shares_track = reader.flag(table, "shared_track")
-        if shares_track and config.contacts.track is None:
+        if shares_track and not config.contacts.place_keys:
             reader.wrong("fit.shared_track", "there is no [contacts.track]", value=True)
         plan = cls(
             config,

@@ -1,7 +1,7 @@
 """The start of a simulation that belongs to no trace: the sliding in which it forgets how it began.
 
 A trace that begins under force is taken from the middle of an experiment. Its simulation is loaded
-first, and then slides until contacts have been replaced and the strength of the track is another.
+first, and then slides until contacts have been replaced and the place has another strength.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ def run_in_distance(config: Config, force: float) -> float:
     contacts, stiffness = config.contacts, config.spring_stiffness
     loading = max(contacts.static_force, force) / stiffness if stiffness > 0 else 0.0
     loadings = STEADY_LOADINGS if contacts.initial == "steady" else LOADINGS
-    track = 0.0 if contacts.track is None else contacts.track.length
-    return loadings * loading + STRETCHES * contacts.break_stretch + TRACK_LENGTHS * track
+    replaced = STRETCHES * contacts.break_stretch
+    return loadings * loading + replaced + TRACK_LENGTHS * contacts.place_length
 
 
 def run_in_samples(config: Config, force: float, interval: float, count: int) -> int:

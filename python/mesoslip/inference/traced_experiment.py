@@ -249,8 +249,8 @@ def prepare(tree: xr.DataTree, plan: Plan, name: str = "", number: int = 0) -> E
     is_midway = is_measured and not after and _is_loaded(force, math.copysign(scale, velocity))
     if is_midway and plan.shares_track:
         raise FileError(
-            f"{_named(name)}the trace begins in the middle of an experiment, so its place on the "
-            "track is unknown: leave out fit.shared_track"
+            f"{_named(name)}the trace begins in the middle of an experiment, at an unknown place "
+            "on the track: leave out fit.shared_track"
         )
     config = _configured(known, sampling, name)
     whole = Sampling(sampling.times)

@@ -478,6 +478,11 @@ class Contacts(Table):
         return () if self.track is None else ("contacts.track",)
 
     @property
+    def place_length(self) -> float:
+        """Correlation length of the strength from place to place [m]; 0 where it is the same."""
+        return 0.0 if self.track is None else self.track.length
+
+    @property
     def strength_floor(self) -> float:
         """Minimum factor of the thresholds on a track: some contacts can attach anywhere."""
         if self.renewal == "keep":

@@ -5,10 +5,11 @@ module mesoslip_contacts
    use mesoslip_contacts_ensemble, only: make_contact_ensemble
    use mesoslip_contacts_lattice, only: make_contact_lattice
    use mesoslip_contacts_populations, only: make_contact_populations
+   use mesoslip_contacts_row, only: block_key, contact_row_type
    use mesoslip_contacts_thermal_ageing, only: make_thermal_ageing_contacts
    use mesoslip_contacts_thermal_contacts, only: make_thermal_contacts
-   use mesoslip_numerics_errors, only: error_type, raise, status_invalid
-   use mesoslip_numerics_kinds, only: i8
+   use mesoslip_numerics_errors, only: error_type, raise, status_invalid, status_memory
+   use mesoslip_numerics_kinds, only: i8, wp
    use mesoslip_numerics_parameters, only: parameters_type
    implicit none
    private
@@ -34,6 +35,64 @@ contains
 
       call take_contact_parameters(common, parameters, seed, realization, error)
       if (allocated(error)) return
+      if (parameters%has("blocks")) then
+         call make_row(contacts, kind, common, parameters, error)
+      else
+         call make_kind(contacts, kind, common, parameters, error)
+      end if
+   end subroutine make_contacts
+
+   !> Set up the contacts of each block of a row.
+   subroutine make_row(contacts, kind, common, parameters, error)
+      class(contacts_type), allocatable, intent(out) :: contacts
+      character(len=*), intent(in) :: kind
+      !> Parameters of all contacts together
+      type(contact_parameters_type), intent(in) :: common
+      type(parameters_type), intent(inout) :: parameters
+      type(error_type), allocatable, intent(inout) :: error
+
+      type(contact_row_type), allocatable :: row
+      type(contact_parameters_type) :: own
+      type(parameters_type) :: others
+      real(wp) :: spacing
+      integer :: blocks, block, stat
+
+      call parameters%take("blocks", blocks, error)
+      call parameters%take("block_spacing", spacing, error)
+      if (allocated(error)) return
+      if (blocks < 1 .or. modulo(common%count, max(blocks, 1)) /= 0) then
+         call raise(error, status_invalid, "each block of a row has the same number of contacts")
+         return
+      end if
+      allocate (row)
+      allocate (row%block(blocks), stat=stat)
+      if (stat /= 0) then
+         call raise(error, status_memory, "not enough memory for the contacts of the blocks")
+         return
+      end if
+      row%parameters = common
+      do block = 1, blocks
+         own = common
+         own%count = common%count / blocks
+         own%realization = block_key(common%realization, block)
+         ! The blocks go along one track.
+         own%strength%origin = common%strength%origin + (block - 1) * spacing
+         others = parameters
+         call make_kind(row%block(block)%contacts, kind, own, others, error)
+         if (allocated(error)) return
+         row%has_clocks = row%has_clocks .or. row%block(block)%contacts%has_clocks
+      end do
+      call move_alloc(row, contacts)
+   end subroutine make_row
+
+   !> Set up contacts of a kind from the parameters that all kinds have and those of its own.
+   subroutine make_kind(contacts, kind, common, parameters, error)
+      class(contacts_type), allocatable, intent(out) :: contacts
+      character(len=*), intent(in) :: kind
+      type(contact_parameters_type), intent(in) :: common
+      type(parameters_type), intent(inout) :: parameters
+      type(error_type), allocatable, intent(inout) :: error
+
       select case (kind)
       case ("ageing")
          call make_contact_ageing(contacts, common, parameters, error)
@@ -56,6 +115,6 @@ contains
       case default
          call raise(error, status_invalid, "unknown kind of contacts '" // kind // "'")
       end select
-   end subroutine make_contacts
+   end subroutine make_kind
 
 end module mesoslip_contacts

@@ -10,6 +10,7 @@ module mesoslip_boundary_names
    use mesoslip_numerics_errors, only: error_type, raise, status_invalid
    use mesoslip_numerics_parameters, only: name_length
    use mesoslip_recording_avalanches, only: avalanche_columns, snapshot_event_columns
+   use mesoslip_recording_ruptures, only: rupture_columns
    use mesoslip_recording_slip_trace, only: slip_trace_columns
    use mesoslip_recording_slips, only: slip_columns
    use mesoslip_recording_stages, only: stage_columns
@@ -41,6 +42,8 @@ contains
          names = slip_columns
       case ("stages")
          names = stage_columns
+      case ("ruptures")
+         names = rupture_columns
       case ("avalanches")
          names = avalanche_columns
       case ("snapshot_events")

@@ -180,12 +180,13 @@ end subroutine set_stop
 
 !> Set the record of the motion of a simulation, which has its contacts.
 subroutine set_recorder(handle, interval, slip_interval, slip_velocity, quiet_time, duration, &
-   & layers, status, message)
+   & layers, blocks, status, message)
    !f2py threadsafe
    use mesoslip_boundary_handles, only: error_type, find_simulation, report, simulation_type
-   use mesoslip_numerics_errors, only: raise, status_invalid
+   use mesoslip_numerics_errors, only: raise, status_invalid, status_memory
    use mesoslip_recording_recorder, only: recorder_parameters_type
    use mesoslip_recording_slips, only: slip_parameters_type
+   use mesoslip_sliders_interface_row, only: block_values
    implicit none
    integer(8), intent(in) :: handle(2)
    !> Interval of the trace, and of the finer traces, 0: no finer traces [s]
@@ -193,18 +194,22 @@ subroutine set_recorder(handle, interval, slip_interval, slip_velocity, quiet_ti
    !> Velocity above the drive's that makes a slip [m/s], 0: no slips; half a period of the setup,
    !> duration of the run [s]
    real(8), intent(in) :: slip_velocity, quiet_time, duration
-   !> Number of layers whose displacements are recorded with the trace
-   integer, intent(in) :: layers
+   !> Numbers of layers whose displacements, and of blocks whose motions are recorded with the trace
+   integer, intent(in) :: layers, blocks
    integer, intent(out) :: status
    character(len=200), intent(out) :: message
 
    type(simulation_type), pointer :: simulation
    type(error_type), allocatable :: error
+   integer :: stat
 
    call find_simulation(handle, .false., simulation, error)
    if (.not. allocated(error)) then
       if (allocated(simulation%contacts)) then
-         call simulation%recorder%open(recorder_parameters_type(interval, duration, layers, &
+         call simulation%ruptures%open(blocks, slip_velocity, quiet_time, stat)
+         if (stat /= 0) call raise(error, status_memory, "not enough memory for the ruptures")
+         call simulation%recorder%open(recorder_parameters_type(interval, duration, &
+            & layers + block_values * blocks, &
             & slip_parameters_type(slip_velocity=slip_velocity, quiet_time=quiet_time, &
             & interval=slip_interval, contacts=simulation%contacts%parameters%count)))
       else

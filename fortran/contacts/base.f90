@@ -92,6 +92,8 @@ module mesoslip_contacts_base
       real(wp) :: cost = 1.0_wp
       !> Length of a schedule that is used up before the normal load ends it, about
       integer :: schedule_length = max_events
+      !> Whether what is offered depends on the state alone, and holds until the next response
+      logical :: keeps_offers = .false.
       !> Clocks of thermally activated breaking, which the slider advances; whether there are any
       type(hazard_clock_type) :: clock(clocks)
       logical :: has_clocks = .false.
@@ -126,6 +128,8 @@ module mesoslip_contacts_base
       !> State of all individual contacts, and records of some
       procedure :: snapshot
       procedure :: records
+      !> Add up energies and errors that are kept in parts
+      procedure :: gather
    end type contacts_type
 
    abstract interface
@@ -249,6 +253,12 @@ contains
 
       time = huge(1.0_wp)
    end function load_time
+
+   !> Add up energies and errors that are kept in parts; by default there are none.
+   subroutine gather(self)
+      class(contacts_type), intent(inout) :: self
+
+   end subroutine gather
 
    !> State of each individual contact.
    pure subroutine snapshot(self, time, displacement, values)

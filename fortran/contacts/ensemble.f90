@@ -61,6 +61,7 @@ contains
       if (allocated(error)) return
       allocate (ensemble)
       ensemble%parameters = common
+      ensemble%keeps_offers = .true.
       call ensemble%allocate_records(columns, rows, error)
       if (allocated(error)) return
       ! A contact that attaches in backward motion starts with the back force against the direction.

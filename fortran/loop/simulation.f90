@@ -1,9 +1,11 @@
 !> The loop of a run: a slider moves under the law of its contacts until one breaks or attaches.
 module mesoslip_loop_simulation
+   use mesoslip_contacts_row, only: contact_row_type
    use mesoslip_interface_law, only: interface_law_type
    use mesoslip_loop_endings, only: ending_drive, ending_none, ending_slips, ending_steady
    use mesoslip_loop_events, only: advance_to_event
    use mesoslip_loop_instant, only: advance_in_equilibrium
+   use mesoslip_loop_row, only: advance_row, start_row
    use mesoslip_loop_scheduled, only: advance_through_schedule
    use mesoslip_loop_segment, only: new_segment, segment_type
    use mesoslip_loop_state, only: state_type
@@ -11,6 +13,7 @@ module mesoslip_loop_simulation
    use mesoslip_numerics_errors, only: error_type, raise, status_invalid, status_stalled
    use mesoslip_numerics_kinds, only: i8, wp
    use mesoslip_sliders_instant, only: instant_slider_type
+   use mesoslip_sliders_interface_row, only: row_slider_type
    use mesoslip_sliders_scheduled, only: scheduled_slider_type
    implicit none
    private
@@ -30,7 +33,7 @@ module mesoslip_loop_simulation
       procedure, non_overridable :: start
       procedure, non_overridable :: follow
       procedure, non_overridable :: run
-      procedure, non_overridable, private :: advance, check_progress
+      procedure, non_overridable, private :: balance, advance, check_progress
    end type simulation_type
 
 contains
@@ -47,12 +50,9 @@ contains
       call self%contacts%initialize(initial)
       call self%slider%drive%begin(self%slider%time)
       call self%slider%adapt_to_drive()
-      law = self%contacts%law()
-      call self%slider%start(law)
       self%slider%direction = self%slider%drive%direction
-      self%start_energy = self%slider%energy() &
-         & + self%contacts%elastic_energy(self%slider%displacement)
-      call self%contacts%respond(self%slider%pose(), self%slider%pose())
+      law = self%contacts%law()
+      call self%balance(law)
       call self%stages%begin(self%slider, self%slider%drive%stage())
       call look_for_steady(self)
       call self%recorder%record(self%slider, self%contacts%detached_count, 0.0_wp)
@@ -65,6 +65,26 @@ contains
       end select
       call self%avalanches%take_due_snapshots(self%slider, self%contacts)
    end subroutine start
+
+   !> Put the slider at rest, in balance with the contacts, which may break at once.
+   subroutine balance(self, law)
+      class(simulation_type), intent(inout), target :: self
+      !> Force of the contacts
+      type(interface_law_type), intent(in) :: law
+
+      select type (contacts => self%contacts)
+      type is (contact_row_type)
+         select type (slider => self%slider)
+         class is (row_slider_type)
+            call start_row(self, slider, contacts)
+            return
+         end select
+      end select
+      call self%slider%start(law)
+      self%start_energy = self%slider%energy() &
+         & + self%contacts%elastic_energy(self%slider%displacement)
+      call self%contacts%respond(self%slider%pose(), self%slider%pose())
+   end subroutine balance
 
    !> Continue from the end of another run, whose state was restored: the first part of the drive is
    !> over, and the second begins. Time, displacement and counts continue.
@@ -111,6 +131,7 @@ contains
             if (segment%is_over(self%advances, self%contacts%breaks)) exit
             if (self%recorder%is_full()) exit
             if (self%avalanches%is_full() .or. self%stages%is_full()) exit
+            if (self%ruptures%is_full()) exit
          end if
          advances = self%advances
          call self%advance(segment)
@@ -124,6 +145,7 @@ contains
          end if
          if (allocated(error)) exit
       end do
+      call self%contacts%gather()
       if (allocated(error)) return
       call self%report_failure(error)
    end subroutine run
@@ -138,6 +160,13 @@ contains
          call advance_in_equilibrium(self, slider, segment)
       class is (scheduled_slider_type)
          call advance_through_schedule(self, segment)
+      class is (row_slider_type)
+         select type (contacts => self%contacts)
+         type is (contact_row_type)
+            call advance_row(self, slider, contacts)
+         class default
+            call advance_to_event(self)
+         end select
       class default
          call advance_to_event(self)
       end select

@@ -9,6 +9,7 @@ module mesoslip_loop_state
    use mesoslip_recording_avalanches, only: avalanche_recorder_type
    use mesoslip_recording_buffer, only: buffer_type
    use mesoslip_recording_recorder, only: recorder_type
+   use mesoslip_recording_ruptures, only: rupture_recorder_type
    use mesoslip_recording_stages, only: stage_recorder_type
    use mesoslip_recording_steady, only: steady_recorder_type
    use mesoslip_schedule, only: max_events, schedule_type
@@ -29,7 +30,8 @@ module mesoslip_loop_state
    integer, parameter :: energy_length = size(energy_columns)
    !> Names of the tables
    character(len=*), parameter :: table_names(*) = [character(len=name_length) :: "trace", &
-      & "slip_trace", "slips", "stages", "layers", "avalanches", "snapshot_events", "snapshots"]
+      & "slip_trace", "slips", "stages", "layers", "blocks", "ruptures", "avalanches", &
+      & "snapshot_events", "snapshots"]
 
    !> A slider with its drive, on contacts, and recorders.
    type :: state_type
@@ -38,6 +40,8 @@ module mesoslip_loop_state
       type(recorder_type) :: recorder
       !> The recorder of avalanches and snapshots
       type(avalanche_recorder_type) :: avalanches
+      !> The recorder of ruptures of the blocks of a row
+      type(rupture_recorder_type) :: ruptures
       !> The recorder of stages of the drive
       type(stage_recorder_type) :: stages
       !> Whether the state is steady, in the last part of the drive
@@ -124,8 +128,10 @@ contains
          buffer => self%recorder%slips%catalogue
       case ("stages")
          buffer => self%stages%rows
-      case ("layers")
+      case ("layers", "blocks")
          buffer => self%recorder%trace%layer_rows
+      case ("ruptures")
+         buffer => self%ruptures%catalogue
       case ("avalanches")
          buffer => self%avalanches%catalogue
       case ("snapshot_events")
@@ -228,6 +234,7 @@ contains
       call self%stages%exchange(archive)
       call self%steady%exchange(archive)
       call self%avalanches%exchange(archive)
+      call self%ruptures%exchange(archive)
       call archive%finish()
       if (archive%saving .or. allocated(archive%failure)) return
       call self%contacts%rebuild(self%slider%displacement)

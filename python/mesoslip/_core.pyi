@@ -142,6 +142,7 @@ def set_recorder(
     quiet_time: float,
     duration: float,
     layers: int,
+    blocks: int,
 ) -> tuple[int, bytes]: ...
 def set_slider(
     handle: NDArray[np.int64],

@@ -161,6 +161,7 @@ class Kernel:
         quiet_time: float,
         duration: float,
         layers: int,
+        blocks: int = 0,
     ) -> None:
         """Set the record of the motion; intervals and times in s, 0 for what is not recorded."""
         self._call(
@@ -171,6 +172,7 @@ class Kernel:
             quiet_time,
             duration,
             layers,
+            blocks,
         )
 
     def set_avalanches(

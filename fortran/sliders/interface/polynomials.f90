@@ -1,0 +1,109 @@
+!> Polynomials in time that are the motion of a block over a step.
+module mesoslip_sliders_interface_polynomials
+   use mesoslip_numerics_kinds, only: wp
+   use mesoslip_numerics_quadrature, only: gauss_legendre
+   use mesoslip_sliders_motion_series, only: inverse
+   implicit none
+   private
+
+   public :: max_order, few_points, many_points, rule_type, new_rule
+   public :: bound, evaluate, integrals, move, reach_of
+
+   !> Maximum order of the displacement
+   integer, parameter :: max_order = 28
+   !> Points of the rules for losses, in a short step and in a long one
+   integer, parameter :: few_points = 4, many_points = 12
+
+   !> Rules of Gauss and Legendre on [0, 1].
+   type :: rule_type
+      real(wp) :: few(few_points) = 0.0_wp, few_weights(few_points) = 0.0_wp
+      real(wp) :: many(many_points) = 0.0_wp, many_weights(many_points) = 0.0_wp
+   end type rule_type
+
+contains
+
+   !> Set up the rules.
+   subroutine new_rule(rule)
+      type(rule_type), intent(out) :: rule
+
+      call gauss_legendre(rule%few, rule%few_weights)
+      call gauss_legendre(rule%many, rule%many_weights)
+   end subroutine new_rule
+
+   !> Step, in units of one over the fastest rate, up to which an order is exact to rounding.
+   pure function reach_of(order) result(reach)
+      integer, intent(in) :: order
+      real(wp) :: reach
+
+      reach = exp((log(1.0e-17_wp) + log_gamma(order + 1.0_wp)) / order)
+   end function reach_of
+
+   !> Value, first and half the second derivative.
+   pure subroutine evaluate(series, order, time, value, slope, bend)
+      real(wp), intent(in) :: series(0:)
+      integer, intent(in) :: order
+      real(wp), intent(in) :: time
+      real(wp), intent(out) :: value, slope, bend
+
+      integer :: term
+
+      value = 0.0_wp
+      slope = 0.0_wp
+      bend = 0.0_wp
+      do term = order, 0, -1
+         bend = bend * time + slope
+         slope = slope * time + value
+         value = value * time + series(term)
+      end do
+   end subroutine evaluate
+
+   !> Let a polynomial count from a later time, by repeated division; only its first terms are kept.
+   pure subroutine move(series, order, time, kept)
+      real(wp), intent(inout) :: series(0:)
+      integer, intent(in) :: order
+      real(wp), intent(in) :: time
+      !> Order up to which the result is needed
+      integer, intent(in) :: kept
+
+      integer :: pass, term
+
+      if (.not. abs(time) > 0.0_wp) return
+      do pass = 0, min(kept, order - 1)
+         do term = order - 1, pass, -1
+            series(term) = series(term) + time * series(term + 1)
+         end do
+      end do
+   end subroutine move
+
+   !> Integral from zero, and the integral of that.
+   pure subroutine integrals(series, order, time, once, twice)
+      real(wp), intent(in) :: series(0:)
+      integer, intent(in) :: order
+      real(wp), intent(in) :: time
+      real(wp), intent(out) :: once, twice
+
+      real(wp) :: part
+      integer :: term
+
+      once = 0.0_wp
+      twice = 0.0_wp
+      do term = order, 0, -1
+         part = series(term) * inverse(term + 1)
+         once = once * time + part
+         twice = twice * time + part * inverse(term + 2)
+      end do
+      once = once * time
+      twice = twice * time**2
+   end subroutine integrals
+
+   !> Bound on the twofold integral of a polynomial up to a time, and on the integral.
+   pure subroutine bound(series, order, time, once, twice)
+      real(wp), intent(in) :: series(0:)
+      integer, intent(in) :: order
+      real(wp), intent(in) :: time
+      real(wp), intent(out) :: once, twice
+
+      call integrals(abs(series(0:order)), order, time, once, twice)
+   end subroutine bound
+
+end module mesoslip_sliders_interface_polynomials

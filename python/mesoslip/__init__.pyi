@@ -1,6 +1,7 @@
 from .analysis.avalanches import avalanche_summary, avalanches
 from .analysis.catalogue_tables import write_table
 from .analysis.export import export
+from .analysis.fronts import fronts
 from .analysis.lyapunov import lyapunov
 from .analysis.regime import regime
 from .analysis.response import response
@@ -55,6 +56,7 @@ __all__ = [
     "example",
     "export",
     "fit",
+    "fronts",
     "lyapunov",
     "mean_field",
     "onset",

@@ -1,22 +1,22 @@
-"""Tables of slips, avalanches, responses and strokes as files."""
+"""Tables of slips, avalanches, responses, strokes and fronts as files."""
 
 from __future__ import annotations
 
 import xarray as xr
 
-from mesoslip.analysis import avalanches, response, slips, strokes
+from mesoslip.analysis import avalanches, fronts, response, slips, strokes
 from mesoslip.configuration.reading import PathLike, as_path
 from mesoslip.errors import FileError
 from mesoslip.output.table_files import is_printed, write_printed
 
 
 def write_table(data: xr.Dataset | xr.DataTree, file: PathLike) -> None:
-    """Write what `slips`, `avalanches`, `response` or `strokes` returned as a table.
+    """Write what `slips`, `avalanches`, `response`, `strokes` or `fronts` returned as a table.
 
     Parameters
     ----------
     data
-        The catalogue, the response, or the strokes.
+        The catalogue, the response, the strokes, or the fronts.
     file
         The file: ``.tex`` for LaTeX with booktabs, ``.md`` for Markdown, each column in one unit;
         otherwise comma-separated values in SI units.
@@ -39,6 +39,12 @@ def write_table(data: xr.Dataset | xr.DataTree, file: PathLike) -> None:
             write_printed(found.tables, path)
         else:
             found.write_csv(path)
+    elif isinstance(data, xr.DataTree) and "fronts" in data.children:
+        catalogue_of_fronts = fronts.fronts_from(data)
+        if for_print:
+            write_printed(catalogue_of_fronts.tables, path)
+        else:
+            catalogue_of_fronts.write_csv(path)
     elif isinstance(data, xr.Dataset) and "slip" in data.dims:
         catalogue = slips.catalogue_from(data)
         if for_print:
@@ -52,5 +58,5 @@ def write_table(data: xr.Dataset | xr.DataTree, file: PathLike) -> None:
             avalanches.write_csv(data, path)
     else:
         raise FileError(
-            f"{path}: is for what mesoslip.slips, avalanches, response or strokes returns"
+            f"{path}: is for what mesoslip.slips, avalanches, response, strokes or fronts returns"
         )

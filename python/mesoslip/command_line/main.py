@@ -23,6 +23,7 @@ from mesoslip.command_line import (
     explore,
     export,
     fit,
+    fronts,
     lyapunov,
     mean_field,
     pictures,
@@ -53,6 +54,7 @@ COMMANDS = (
     catalogues.regime,
     response.response,
     strokes.strokes,
+    fronts.fronts,
     pictures.plot,
     report.report,
     export.export,
@@ -74,6 +76,7 @@ WITHOUT_XARRAY = {
     report.report,
     response.response,
     strokes.strokes,
+    fronts.fronts,
 }
 
 # How to install the libraries that the kernels are linked to.

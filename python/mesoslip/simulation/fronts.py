@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 FRONT_COLUMNS = (
     *("event", "start_time", "end_time", "start_position", "end_position", "length", "speed"),
-    *("force_drop", "kind", "arrest", "stress_ratio_before"),
+    *("force_drop", "kind", "passage", "arrest", "stress_ratio_before"),
 )
 # Values of the columns kind and arrest.
 KINDS = PRECURSOR, WHOLE = "precursor", "whole"
@@ -171,7 +171,7 @@ class FrontFinder:
             self._events.remove(other)
 
     def _over(self, limit: float) -> list[list[float]]:
-        """Rows of the fronts of events that end before a time, in their order; these are removed."""
+        """Rows of the fronts of events that end before a time, which are removed."""
         most = MAX_PASSES * self._blocks
         over = [one for one in self._events if one.end < limit or one.count >= most]
         if not over:
@@ -185,19 +185,19 @@ class FrontFinder:
 
     def _fronts(self, event: _Event) -> Iterator[list[float]]:
         is_whole = len(event.ruptures) == self._blocks
-        for ruptures in event.passes():
+        for passage, ruptures in enumerate(event.passes()):
             numbers = np.array(list(ruptures))
             for piece in np.split(numbers, np.flatnonzero(np.diff(numbers) > 1) + 1):
                 rows = [ruptures[block] for block in piece.tolist()]
                 times = np.array([one.rupture_time for one in rows])
                 for basin in basins(times, self._block_time):
                     for row in self._arms(rows, basin, int(piece[0])):
-                        yield [self._count, *row[:-1], float(is_whole), *row[-1]]
+                        yield [self._count, *row[:-2], is_whole, passage, *row[-2:]]
 
     def _arms(
         self, rows: Sequence[Rupture], basin: Basin, first: int
-    ) -> Iterator[tuple[float, float, float, float, float, float, float, tuple[float, float]]]:
-        """Columns of the fronts of a nucleation, but for the event and the kind; ``first`` is the
+    ) -> Iterator[tuple[float, ...]]:
+        """Columns of the fronts of a nucleation, but for event, kind and passage; ``first`` is the
         number of the first of the blocks."""
         sides = [
             (direction, end)
@@ -229,10 +229,8 @@ class FrontFinder:
                 float(abs(stop - start)),
                 front_speed(times, centers),
                 float(np.sum(before - after)),
-                (
-                    float(ARRESTS.index(arrest)),
-                    float(np.mean(np.abs(before) / self._strength(starts))),
-                ),
+                float(ARRESTS.index(arrest)),
+                float(np.mean(np.abs(before) / self._strength(starts))),
             )
 
 

@@ -48,7 +48,7 @@ def output_bytes(config: Config, *, has_finer: bool = True) -> float:
     """
     samples = config.expected_duration / config.output_interval + 1
     layers = config.slider.layers_recorded(config)
-    blocks = BLOCK_NUMBERS * config.slider.block_count
+    blocks = len(BLOCK_NUMBERS) * config.slider.block_count
     numbers = samples * (len(COLUMNS["trace"]) + layers + blocks)
     numbers += has_finer * finer_samples(config) * len(COLUMNS["slip_trace"])
     snapshots = len(config.output.snapshots) * config.contacts.count
@@ -67,7 +67,7 @@ def check_memory(config: Config, available: float | None = None) -> None:
     together = min(run.realizations, os.cpu_count() or 1)
     in_catalogue = (run.avalanches or 0) if output.avalanche_size is None else 0
     slider = config.slider
-    further = slider.layers_recorded(config) + BLOCK_NUMBERS * slider.block_count
+    further = slider.layers_recorded(config) + len(BLOCK_NUMBERS) * slider.block_count
     per_sample = BYTES_PER_SAMPLE + BYTES_PER_NUMBER * further
     finer = finer_samples(config)
     sites = config.contact_kind.site_count(contacts)

@@ -50,8 +50,11 @@ COLUMNS: dict[str, tuple[str, ...]] = {
 TABLES = tuple(COLUMNS)
 # Tables that are not the kernels', but found in others as a run goes on.
 FOUND = frozenset({"fronts"})
-# Numbers of each block in a row of blocks: displacement, velocity, contact force, detached.
-BLOCK_NUMBERS = 4
+# Numbers of each block in a row of the table of blocks, each for all blocks one after another.
+BLOCK_NUMBERS = (
+    *("block_displacement", "block_velocity", "block_contact_force"),
+    "block_detached_contacts",
+)
 
 # Sentinel: the stretch of a detached contact.
 DETACHED = 1e300

@@ -72,7 +72,7 @@ class Start:
         if table == "layers":
             return rows - self.progress.displacement
         if table == "blocks":
-            count = rows.shape[1] // BLOCK_NUMBERS
+            count = rows.shape[1] // len(BLOCK_NUMBERS)
             return np.concatenate(
                 [rows[:, :count] - self.progress.displacement, rows[:, count:]], axis=1
             )

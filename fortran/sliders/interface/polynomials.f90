@@ -6,29 +6,46 @@ module mesoslip_sliders_interface_polynomials
    implicit none
    private
 
-   public :: max_order, few_points, many_points, rule_type, new_rule
+   public :: max_order, min_points, max_points, rule_type, new_rules, points_for
    public :: bound, evaluate, integrals, move, reach_of
 
    !> Maximum order of the displacement
    integer, parameter :: max_order = 28
-   !> Points of the rules for losses, in a short step and in a long one
-   integer, parameter :: few_points = 4, many_points = 12
+   !> Numbers of points of the rules for losses
+   integer, parameter :: min_points = 3, max_points = 10
+   !> Change of the phase of the fastest oscillation in a step, up to which the square of its
+   !> velocity is integrated to rounding by a number of points
+   real(wp), parameter :: max_phase(min_points:max_points) = [0.012_wp, 0.073_wp, 0.22_wp, &
+      & 0.48_wp, 0.85_wp, 1.33_wp, 1.9_wp, 2.5_wp]
 
-   !> Rules of Gauss and Legendre on [0, 1].
+   !> A rule of Gauss and Legendre on [0, 1].
    type :: rule_type
-      real(wp) :: few(few_points) = 0.0_wp, few_weights(few_points) = 0.0_wp
-      real(wp) :: many(many_points) = 0.0_wp, many_weights(many_points) = 0.0_wp
+      real(wp) :: point(max_points) = 0.0_wp, weight(max_points) = 0.0_wp
    end type rule_type
 
 contains
 
    !> Set up the rules.
-   subroutine new_rule(rule)
-      type(rule_type), intent(out) :: rule
+   subroutine new_rules(rule)
+      type(rule_type), intent(out) :: rule(min_points:max_points)
 
-      call gauss_legendre(rule%few, rule%few_weights)
-      call gauss_legendre(rule%many, rule%many_weights)
-   end subroutine new_rule
+      integer :: points
+
+      do points = min_points, max_points
+         call gauss_legendre(rule(points)%point(:points), rule(points)%weight(:points))
+      end do
+   end subroutine new_rules
+
+   !> Number of points of the rule for a step.
+   pure function points_for(phase) result(points)
+      !> Duration of the step times the fastest rate
+      real(wp), intent(in) :: phase
+      integer :: points
+
+      do points = min_points, max_points - 1
+         if (phase <= max_phase(points)) return
+      end do
+   end function points_for
 
    !> Step, in units of one over the fastest rate, up to which an order is exact to rounding.
    pure function reach_of(order) result(reach)

@@ -13,8 +13,8 @@ module mesoslip_sliders_interface_row
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_sliders_base, only: slider_type
    use mesoslip_sliders_hazard_clock, only: advance_clocks, limit_window
-   use mesoslip_sliders_interface_polynomials, only: bound, evaluate, few_points, integrals, &
-      & many_points, max_order, move, new_rule, reach_of, rule_type
+   use mesoslip_sliders_interface_polynomials, only: bound, evaluate, integrals, max_order, &
+      & max_points, min_points, move, new_rules, points_for, reach_of, rule_type
    use mesoslip_sliders_interface_queue, only: event_queue_type
    use mesoslip_sliders_motion_series, only: first_end, inverse
    implicit none
@@ -35,8 +35,6 @@ module mesoslip_sliders_interface_row
    real(wp), parameter :: busy_pace = 0.2_wp, quiet_pace = 2.5_wp
    !> Minimum order of a motion
    integer, parameter :: min_order = 4
-   !> Part of a step below which few points are enough for its losses
-   real(wp), parameter :: short_pace = 0.1_wp
    !> Forces and displacements that are equal up to rounding
    real(wp), parameter :: rounding = 64.0_wp * epsilon(1.0_wp)
 
@@ -81,8 +79,8 @@ module mesoslip_sliders_interface_row
       real(wp), allocatable :: pull(:)
       !> Number of neighbours of each block
       real(wp), allocatable :: neighbours(:)
-      !> Published motion of each block, shape (blocks, 0:max_order), and its order
-      real(wp), allocatable :: published(:, :)
+      !> Published motion of each block and its damper's, shape (blocks, 0:max_order), and its order
+      real(wp), allocatable :: published(:, :), published_damper(:, :)
       integer :: order = min_order
       !> Own motion of each block since its own time, the damper's, and the excess over the published
       !> motion, shape (0:max_order, blocks); motion of both neighbours together
@@ -111,7 +109,8 @@ module mesoslip_sliders_interface_row
       !> Fastest rate [1/s], and the reach of each order
       real(wp) :: rate = 1.0_wp
       real(wp) :: reach(max_order) = 0.0_wp
-      type(rule_type) :: rule
+      !> Rules for the losses, by their numbers of points
+      type(rule_type) :: rule(min_points:max_points)
       !> Mean displacement, velocity and half the acceleration at the start and at the end of the
       !> step, the same of the pulled blocks; contact force; shape (start or end)
       real(wp) :: mean(3, 2) = 0.0_wp, pulled(3, 2) = 0.0_wp, total_force(2) = 0.0_wp
@@ -120,7 +119,8 @@ module mesoslip_sliders_interface_row
       procedure, non_overridable :: begin_step, next_event, stop_block, renew, take_law, end_step
       procedure, non_overridable :: block_pose, block_force, solve_static, sum_motion
       procedure, non_overridable, private :: expand_all, expand, predict, predict_all, carry, &
-         & publish, try_rest, load_motion, add_losses, limit_by_excess
+         & publish, try_rest, load_motion, add_losses, limit_by_excess, motion_of_damper, &
+         & carry_published, add_published_losses
    end type row_slider_type
 
 contains
@@ -141,7 +141,7 @@ contains
          if (stat == 0) allocate (self%sense(n), self%neighbours(n), source=1.0_wp, stat=stat)
          if (stat == 0) allocate (self%law(n), self%window(n), self%block_clock(clocks, n), stat=stat)
          if (stat == 0) allocate (self%elapsed(clocks, n), self%published(n, 0:max_order), &
-            & self%own(0:max_order, n), self%own_damper(0:max_order, n), &
+            & self%published_damper(n, 0:max_order), self%own(0:max_order, n), self%own_damper(0:max_order, n), &
             & self%excess(0:max_order, n), self%around(0:max_order, n), source=0.0_wp, stat=stat)
          if (stat == 0) allocate (self%own_order(n), self%kind(n), source=0, stat=stat)
          if (stat == 0) allocate (self%is_own(n), self%exceeds(n), source=.false., stat=stat)
@@ -161,7 +161,7 @@ contains
       do order = 1, max_order
          self%reach(order) = reach_of(order)
       end do
-      call new_rule(self%rule)
+      call new_rules(self%rule)
    end subroutine set_up_row
 
    !> Begin a step that ends at a time or before: the motion of all blocks if nothing happens.
@@ -254,7 +254,7 @@ contains
    subroutine expand_all(self)
       class(row_slider_type), intent(inout) :: self
 
-      real(wp), dimension(self%blocks) :: stiffness, drag, damper, force, offset
+      real(wp), dimension(self%blocks) :: stiffness, drag, force, offset
       real(wp) :: drive(0:2), push
       integer :: term, n
 
@@ -264,12 +264,14 @@ contains
          & + self%law%stiffness * self%inverse_mass
       drag = self%law%drag * self%inverse_mass + self%neighbours * self%viscosity
       offset = (self%law%offset + self%law%rate * self%offer_moment) * self%inverse_mass
-      damper = self%damper
-      associate (series => self%published)
+      associate (series => self%published, damper => self%published_damper)
+         damper(:, :1) = 0.0_wp
+         damper(:, 0) = self%damper
          series(:, 0) = self%place
          series(:, 1) = self%speed
          do term = 0, self%order - 2
-            force = -stiffness * series(:, term) - (term + 1) * drag * series(:, term + 1) - damper
+            force = -stiffness * series(:, term) - (term + 1) * drag * series(:, term + 1)
+            if (self%damping > 0.0_wp) force = force - damper(:, term)
             if (term <= 2) force = force + self%pull * drive(term)
             if (term == 0) force = force + offset
             if (term == 1) force = force - self%law%rate * self%inverse_mass
@@ -281,7 +283,8 @@ contains
                force(:n - 1) = force(:n - 1) + push * series(2:, term + 1)
             end if
             series(:, term + 2) = force * (inverse(term + 1) * inverse(term + 2))
-            if (self%damping > 0.0_wp) damper = self%damping * (force - damper) * inverse(term + 1)
+            if (self%damping > 0.0_wp) damper(:, term + 1) = self%damping * inverse(term + 1) &
+               & * (force - damper(:, term))
          end do
       end associate
       self%bend = self%published(:, 2)
@@ -469,7 +472,8 @@ contains
       !> Time from its own [s]
       real(wp), intent(in) :: step
 
-      real(wp) :: series(0:max_order), velocity(0:max_order), once, twice, first_once, start
+      real(wp) :: series(0:max_order), velocity(0:max_order), damper(0:max_order), once, twice
+      real(wp) :: first_once, start
       integer :: order, term
       logical :: is_due
 
@@ -499,9 +503,9 @@ contains
       end if
       if (self%damping > 0.0_wp) then
          once = 0.0_wp
-         if (.not. self%is_own(block)) call expand_damper(self, block, series, order)
+         damper = self%motion_of_damper(block, order)
          do term = order - 1, 0, -1
-            once = once * step + self%own_damper(term, block)
+            once = once * step + damper(term)
          end do
          self%damper(block) = once
       end if
@@ -519,20 +523,18 @@ contains
       end if
    end subroutine carry
 
-   !> Series of a block's damper along a motion.
-   pure subroutine expand_damper(self, block, series, order)
-      class(row_slider_type), intent(inout) :: self
+   !> Series of the deceleration by a block's damper since its own time.
+   pure function motion_of_damper(self, block, order) result(damper)
+      class(row_slider_type), intent(in) :: self
       integer, intent(in) :: block, order
-      real(wp), intent(in) :: series(0:max_order)
+      real(wp) :: damper(0:max_order)
 
-      integer :: term
-
-      self%own_damper(0, block) = self%damper(block)
-      do term = 0, order - 2
-         self%own_damper(term + 1, block) = self%damping * inverse(term + 1) &
-            & * ((term + 1) * (term + 2) * series(term + 2) - self%own_damper(term, block))
-      end do
-   end subroutine expand_damper
+      if (self%is_own(block)) then
+         damper(:order - 1) = self%own_damper(:order - 1, block)
+      else
+         damper(:order - 1) = self%published_damper(block, :order - 1)
+      end if
+   end function motion_of_damper
 
    !> Add the losses of a block in a part of the step.
    subroutine add_losses(self, block, series, order, step)
@@ -540,58 +542,138 @@ contains
       integer, intent(in) :: block, order
       real(wp), intent(in) :: series(0:max_order), step
 
-      real(wp) :: drag
+      real(wp) :: drag, time, speed, deceleration, pull, square, damped
+      real(wp) :: damper(0:max_order), around(0:max_order)
+      integer :: points, node, term
 
       drag = self%law(block)%drag * self%inverse_mass
       if (.not. (drag > 0.0_wp .or. self%damping > 0.0_wp .or. self%viscosity > 0.0_wp)) return
-      if (.not. self%is_own(block)) then
-         if (self%damping > 0.0_wp) call expand_damper(self, block, series, order)
-         if (self%viscosity > 0.0_wp) self%around(:order, block) = neighbour_motion(self, block, order)
+      if (self%damping > 0.0_wp) damper = self%motion_of_damper(block, order)
+      if (self%viscosity > 0.0_wp) then
+         if (self%is_own(block)) then
+            around(:order) = self%around(:order, block)
+         else
+            around(:order) = neighbour_motion(self, block, order)
+         end if
       end if
-      if (step * self%rate <= short_pace) then
-         call apply(self%rule%few, self%rule%few_weights)
-      else
-         call apply(self%rule%many, self%rule%many_weights)
-      end if
-
-   contains
-
-      subroutine apply(point, weight)
-         real(wp), intent(in) :: point(:), weight(:)
-
-         real(wp) :: time, speed, damper, around, square, damped
-         integer :: node, term
-
-         square = 0.0_wp
-         damped = 0.0_wp
-         do node = 1, size(point)
-            time = point(node) * step
-            speed = 0.0_wp
-            do term = order, 1, -1
-               speed = speed * time + term * series(term)
-            end do
-            square = square + weight(node) * speed**2
+      points = points_for(self%rate * step)
+      square = 0.0_wp
+      damped = 0.0_wp
+      do node = 1, points
+         time = self%rule(points)%point(node) * step
+         speed = 0.0_wp
+         do term = order, 1, -1
+            speed = speed * time + term * series(term)
+         end do
+         associate (weight => self%rule(points)%weight(node))
+            square = square + weight * speed**2
             if (self%damping > 0.0_wp) then
-               damper = 0.0_wp
+               deceleration = 0.0_wp
                do term = order - 1, 0, -1
-                  damper = damper * time + self%own_damper(term, block)
+                  deceleration = deceleration * time + damper(term)
                end do
-               damped = damped + weight(node) * damper * speed
+               damped = damped + weight * deceleration * speed
             end if
             if (self%viscosity > 0.0_wp) then
-               around = 0.0_wp
+               pull = 0.0_wp
                do term = order, 1, -1
-                  around = around * time + term * self%around(term, block)
+                  pull = pull * time + term * around(term)
                end do
-               damped = damped + weight(node) * self%viscosity &
-                  & * (self%neighbours(block) * speed - around) * speed
+               damped = damped + weight * self%viscosity &
+                  & * (self%neighbours(block) * speed - pull) * speed
             end if
-         end do
-         self%drag_part = self%drag_part + drag * square * step
-         self%damping_part = self%damping_part + damped * step
-      end subroutine apply
-
+         end associate
+      end do
+      self%drag_part = self%drag_part + drag * square * step
+      self%damping_part = self%damping_part + damped * step
    end subroutine add_losses
+
+   !> Move all blocks that go on as published to the end of the step, with their books.
+   subroutine carry_published(self)
+      class(row_slider_type), intent(inout) :: self
+
+      real(wp), dimension(self%blocks) :: share, once, twice, part
+      integer :: term
+
+      ! 1 for a block that goes on as published.
+      share = merge(0.0_wp, 1.0_wp, self%is_own)
+      once = 0.0_wp
+      twice = 0.0_wp
+      associate (series => self%published, step => self%length)
+         do term = self%order, 0, -1
+            part = series(:, term) * inverse(term + 1)
+            once = once * step + part
+            twice = twice * step + part * inverse(term + 2)
+         end do
+         self%pulled_once = self%pulled_once + step * sum(share * self%pull * once)
+         self%pulled_lever = self%pulled_lever + step**2 * sum(share * self%pull * (once - twice))
+         call self%add_published_losses(share)
+         once = 0.0_wp
+         twice = 0.0_wp
+         part = 0.0_wp
+         do term = self%order, 0, -1
+            part = part * step + twice
+            twice = twice * step + once
+            once = once * step + series(:, term)
+         end do
+         where (.not. self%is_own)
+            self%place = once
+            self%speed = twice
+            self%bend = part
+         end where
+         if (self%damping > 0.0_wp) then
+            once = 0.0_wp
+            do term = self%order - 1, 0, -1
+               once = once * step + self%published_damper(:, term)
+            end do
+            where (.not. self%is_own) self%damper = once
+         end if
+         where (.not. self%is_own .and. abs(self%speed) > 0.0_wp) self%sense = sign(1.0_wp, self%speed)
+         where (.not. self%is_own) self%moment = step
+      end associate
+   end subroutine carry_published
+
+   !> Add the losses of all blocks that go on as published in the step.
+   subroutine add_published_losses(self, share)
+      class(row_slider_type), intent(inout) :: self
+      !> 1 for a block that goes on as published, else 0
+      real(wp), intent(in) :: share(:)
+
+      real(wp), dimension(self%blocks) :: drag, speed, deceleration
+      real(wp) :: time, square, damped
+      integer :: points, node, term, n
+
+      n = self%blocks
+      drag = share * self%law%drag * self%inverse_mass
+      if (.not. (any(drag > 0.0_wp) .or. self%damping > 0.0_wp .or. self%viscosity > 0.0_wp)) return
+      points = points_for(self%rate * self%length)
+      square = 0.0_wp
+      damped = 0.0_wp
+      do node = 1, points
+         time = self%rule(points)%point(node) * self%length
+         speed = 0.0_wp
+         do term = self%order, 1, -1
+            speed = speed * time + term * self%published(:, term)
+         end do
+         associate (weight => self%rule(points)%weight(node))
+            square = square + weight * sum(drag * speed**2)
+            deceleration = 0.0_wp
+            if (self%damping > 0.0_wp) then
+               do term = self%order - 1, 0, -1
+                  deceleration = deceleration * time + self%published_damper(:, term)
+               end do
+            end if
+            if (self%viscosity > 0.0_wp) then
+               deceleration = deceleration + self%viscosity * self%neighbours * speed
+               deceleration(2:) = deceleration(2:) - self%viscosity * speed(:n - 1)
+               deceleration(:n - 1) = deceleration(:n - 1) - self%viscosity * speed(2:)
+            end if
+            damped = damped + weight * sum(share * deceleration * speed)
+         end associate
+      end do
+      self%drag_part = self%drag_part + square * self%length
+      self%damping_part = self%damping_part + damped * self%length
+   end subroutine add_published_losses
 
    !> Published motion of both neighbours of a block together.
    pure function neighbour_motion(self, block, order) result(around)
@@ -772,6 +854,7 @@ contains
       integer :: block
 
       excess = 0.0_wp
+      if (.not. self%has_clocks) call self%carry_published()
       do block = 1, self%blocks
          call self%carry(block, self%length - self%moment(block))
          if (.not. self%exceeds(block)) cycle

@@ -71,6 +71,7 @@ contains
       call self%solve_static([self%drive%value, 0.0_wp], self%place, self%speed)
       self%speed = 0.0_wp
       self%step_time = self%time
+      self%base_time = self%time
       call self%sum_motion(1)
       call self%sum_motion(2)
    end subroutine start
@@ -209,6 +210,7 @@ contains
       call archive%exchange("tiny_displacement", self%tiny_displacement)
       call archive%exchange("pinned_stiffness", self%pinned_stiffness)
       call archive%exchange("pace", self%pace)
+      call archive%exchange("base_time", self%base_time)
       call archive%exchange("is_quiet", self%is_quiet)
       call archive%exchange_fixed("place", [self%blocks, 1], self%place)
       call archive%exchange_fixed("speed", [self%blocks, 1], self%speed)

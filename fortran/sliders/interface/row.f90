@@ -71,6 +71,8 @@ module mesoslip_sliders_interface_row
       real(wp) :: pace = busy_pace
       !> Whether no contact broke or attached in the last step; whether all blocks rest
       logical :: is_quiet = .false., rests = .false.
+      !> Time from which the blocks' own times count: the start of a step, then its end [s]
+      real(wp) :: base_time = 0.0_wp
       !> Length of the step [s]
       real(wp) :: length = 0.0_wp
 
@@ -173,6 +175,7 @@ contains
       integer :: order
 
       self%step_time = self%time
+      self%base_time = self%time
       self%end_time = end_time
       self%moment = 0.0_wp
       self%excess_once = 0.0_wp
@@ -243,9 +246,9 @@ contains
 
       real(wp) :: rate, acceleration
 
-      rate = self%drive%rate_at(self%step_time)
+      rate = self%drive%rate_at(self%base_time)
       acceleration = self%drive%acceleration
-      drive(0) = self%drive%at(self%step_time) + (rate + 0.5_wp * acceleration * moment) * moment
+      drive(0) = self%drive%at(self%base_time) + (rate + 0.5_wp * acceleration * moment) * moment
       drive(1) = rate + acceleration * moment
       drive(2) = 0.5_wp * acceleration
    end function drive_at
@@ -308,7 +311,7 @@ contains
          self%horizon(block) = self%length
          associate (window => self%window(block))
             if (.not. (way(block) < min(window%upper - self%place(block), self%place(block) &
-               & - window%lower) .and. window%end_time - self%step_time > self%length) &
+               & - window%lower) .and. window%end_time - self%base_time > self%length) &
                & .or. self%has_clocks) call self%predict(block)
          end associate
          call self%queue%put(block, self%span(block))
@@ -346,7 +349,7 @@ contains
 
       call self%load_motion(block, series, order)
       window = self%window(block)
-      if (self%has_clocks) call limit_window(self%block_clock(:, block), self%step_time &
+      if (self%has_clocks) call limit_window(self%block_clock(:, block), self%base_time &
          & + self%moment(block), self%speed(block), 2.0_wp * self%bend(block), window)
       associate (kind => self%kind(block))
          kind = event_none
@@ -355,9 +358,9 @@ contains
             kind = event_again
             step = self%horizon(block)
          end if
-         if (window%end_time - self%step_time <= step) then
+         if (window%end_time - self%base_time <= step) then
             kind = event_time
-            step = window%end_time - self%step_time
+            step = window%end_time - self%base_time
          end if
          step = max(0.0_wp, step - self%moment(block))
          do term = 0, order - 1
@@ -447,7 +450,7 @@ contains
       end select
       pose = self%block_pose(block)
       ! Nor may rounding keep it before the end of its window.
-      if (self%window(block)%end_time - self%step_time <= self%moment(block) &
+      if (self%window(block)%end_time - self%base_time <= self%moment(block) &
          & * (1.0_wp + 4.0_wp * epsilon(1.0_wp))) then
          pose%time = max(pose%time, self%window(block)%end_time)
       end if
@@ -460,7 +463,7 @@ contains
       integer, intent(in) :: block
       type(pose_type) :: pose
 
-      pose = pose_type(self%step_time + self%moment(block), self%place(block), self%speed(block), &
+      pose = pose_type(self%base_time + self%moment(block), self%place(block), self%speed(block), &
          & 2.0_wp * self%bend(block), self%sense(block), self%inverse_mass, &
          & sqrt(self%neighbours(block) * self%bond + self%pull(block)), .false.)
    end function block_pose
@@ -890,6 +893,7 @@ contains
       else
          self%time = self%time + self%length
       end if
+      self%base_time = self%time
       self%moment = 0.0_wp
       if (self%events > 0) then
          self%pace = busy_pace

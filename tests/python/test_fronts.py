@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from kinds import configuration
 from mesoslip import Config, ConfigError, FileError
-from mesoslip.analysis.fronts import EVENTS, fronts_of
+from mesoslip.analysis.fronts import EVENTS, fronts_of, static_balance
 from mesoslip.simulation.fronts import (
     ARRESTS,
     CLOSED_AFTER,
@@ -85,7 +85,7 @@ def test_a_block_that_breaks_early_by_less_than_sound_needs_is_no_nucleation():
 
 
 def test_slips_apart_by_the_quiet_time_or_a_block_are_other_events():
-    rows = ruptures({1: 1.0, 2: 1.05, 4: 1.05, 5: 1.06, 8: 2.0})
+    rows = ruptures({1: 1.0, 3: 1.05, 6: 1.05, 7: 1.06, 10: 2.0})
     assert [one["event"] for one in found(rows)] == [0, 1, 2]
     later = ruptures({1: 1.0, 2: 1.0 + 0.03 + 1.01 * QUIET})
     assert [one["event"] for one in found(later)] == [0, 1]
@@ -94,7 +94,7 @@ def test_slips_apart_by_the_quiet_time_or_a_block_are_other_events():
 
 
 def test_a_rupture_that_comes_late_joins_events():
-    rows = np.vstack([ruptures({1: 1.0, 3: 1.0}), ruptures({2: 1.02})])
+    rows = np.vstack([ruptures({1: 1.0, 4: 1.0}), ruptures({2: 1.02})])
     (first, *others) = found(rows)
     assert {one["event"] for one in (first, *others)} == {0.0}
 
@@ -194,9 +194,10 @@ def test_catalogues_of_an_output_belong_together(tree):
         ruptures["rupture_time"] <= ruptures["end_time"]
     )
     assert is_within.all()
-    # Every rupture is in one front, but for that of a nucleation, which is in both.
-    lengths = float(fronts["length"].sum())
-    assert lengths == pytest.approx(ruptures.sizes["rupture"] * 1e-2 / 6)
+    # Every rupture is in one front, which may pass a block that broke in part.
+    lengths = float(fronts["length"].sum()) / (1e-2 / 6)
+    assert ruptures.sizes["rupture"] <= lengths * (1 + 1e-9)
+    assert lengths < 1.3 * ruptures.sizes["rupture"]
     assert fronts["kind"].attrs["flag_meanings"] == "precursor whole"
     assert fronts["kind"].attrs["flag_values"].tolist() == [0, 1]
 
@@ -210,7 +211,8 @@ def test_the_function_and_its_tables_agree(tree, tmp_path):
     own = found.events["realization_index"] == 1
     assert found.events["event"][own].tolist() == list(range(int(own.sum())))
     blocks = found.events["block_count"]
-    assert np.all((found.events["kind"] == 1) == (blocks == 6))
+    assert np.all((found.events["kind"] == 1) <= (blocks == 6))
+    assert 0 < np.sum(found.events["kind"] == 1) < blocks.size
     mesoslip.write_table(result, tmp_path / "fronts.csv")
     head, *rows = (tmp_path / "fronts.csv").read_text().splitlines()
     assert head.startswith("realization_index [1],event [1],start_time [s]")
@@ -316,3 +318,25 @@ def test_derived_quantities_are_those_of_the_chain():
     frequencies = np.sqrt(np.linalg.eigvalsh(chain) / values["block_mass"])
     assert frequencies[0] == pytest.approx(values["omega_l"])
     assert frequencies[-1] < values["pinned_frequency_highest"]
+
+
+def test_the_static_balance_is_that_of_a_pinned_row():
+    slider = configuration("interface").to_dict()["slider"] | {"blocks": 12}
+    config = configuration("interface", slider=slider)
+    forces = static_balance(config, 0.4)
+    spring, contact = config.slider.neighbour_spring, config.contacts.stiffness / 12
+    for ruptured in (0, 5, 11):
+        ahead = 12 - ruptured
+        chain = 2 * np.eye(ahead) - np.eye(ahead, k=1) - np.eye(ahead, k=-1)
+        chain[0, 0] -= 1
+        chain[-1, -1] -= 1 if ahead > 1 else 0
+        load = np.zeros(ahead)
+        load[0] = 1.0
+        places = np.linalg.solve(spring * chain * (ahead > 1) + contact * np.eye(ahead), load)
+        # The first pinned block bears its static force.
+        tension = config.contacts.static_force / 12 / (contact * places[0])
+        behind = 0.4 * ruptured * config.contacts.static_force / 12
+        assert forces[ruptured] == pytest.approx(behind + tension, rel=1e-9)
+    above = slider | {"loading": "top", "top_stiffness": 9.0}
+    del above["stiffness"]
+    assert static_balance(configuration("interface", slider=above), 0.4) is None

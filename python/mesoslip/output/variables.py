@@ -281,7 +281,7 @@ FRONTS = Group(
         "m s-1", "speed of the front, negative towards the edge; missing if it is not resolved"
     ),
     force_drop=Meaning("N", "drop of the force on the contacts of its blocks"),
-    kind=_flags("whether all blocks ruptured in its event", " ".join(fronts.KINDS)),
+    kind=_flags("whether its event reached both ends", " ".join(fronts.KINDS)),
     passage=Meaning(
         "1",
         "passage over its blocks in the event, 0 where they rupture for the first time",

@@ -1,7 +1,8 @@
 """Fronts of detachment along an interface, found in the ruptures of its blocks as a run goes on.
 
 Ruptures of neighbouring blocks whose slips overlap, each with the quiet time after it, are one
-event. Within an event, minima of the rupture time along the row are nucleations, and each arm from
+event; between neighbours may be a block that broke in part only. An event is whole if it includes
+both ends, otherwise a precursor. Within an event, minima of the rupture time along the row are nucleations, and each arm from
 a nucleation to where the rupture stops or meets another is a front.
 """
 
@@ -24,6 +25,10 @@ FRONT_COLUMNS = (
 KINDS = PRECURSOR, WHOLE = "precursor", "whole"
 ARRESTS = ARRESTED, MET, AT_END = "arrested", "met_another", "at_an_end"
 
+# Blocks from one rupture to the next in an event, at most.
+REACH = 2
+# Minimum number of blocks in a front with a speed.
+MIN_BLOCKS = 3
 # Quiet times after the last slip of an event after which it is over: a slip of a block that lasts
 # longer than them is in an event of its own.
 CLOSED_AFTER = 100.0
@@ -59,7 +64,7 @@ class _Event:
         return any(
             one.start_time <= other.end_time + quiet_time
             and other.start_time <= one.end_time + quiet_time
-            for beside in (block - 1, block, block + 1)
+            for beside in range(block - REACH, block + REACH + 1)
             for other in self.ruptures.get(beside, ())
         )
 
@@ -184,21 +189,21 @@ class FrontFinder:
         return rows
 
     def _fronts(self, event: _Event) -> Iterator[list[float]]:
-        is_whole = len(event.ruptures) == self._blocks
+        is_whole = {1, self._blocks} <= event.ruptures.keys()
         for passage, ruptures in enumerate(event.passes()):
             numbers = np.array(list(ruptures))
-            for piece in np.split(numbers, np.flatnonzero(np.diff(numbers) > 1) + 1):
+            for piece in np.split(numbers, np.flatnonzero(np.diff(numbers) > REACH) + 1):
                 rows = [ruptures[block] for block in piece.tolist()]
                 times = np.array([one.rupture_time for one in rows])
                 for basin in basins(times, self._block_time):
-                    for row in self._arms(rows, basin, int(piece[0])):
+                    for row in self._arms(rows, basin, piece):
                         yield [self._count, *row[:-2], is_whole, passage, *row[-2:]]
 
     def _arms(
-        self, rows: Sequence[Rupture], basin: Basin, first: int
+        self, rows: Sequence[Rupture], basin: Basin, piece: NDArray[np.integer[Any]]
     ) -> Iterator[tuple[float, ...]]:
-        """Columns of the fronts of a nucleation, but for event, kind and passage; ``first`` is the
-        number of the first of the blocks."""
+        """Columns of the fronts of a nucleation, but for event, kind and passage; ``piece`` has the
+        numbers of the blocks."""
         sides = [
             (direction, end)
             for direction, end in ((-1, basin.first), (1, basin.last))
@@ -206,8 +211,7 @@ class FrontFinder:
         ]
         for direction, end in sides or [(1, basin.nucleus)]:
             own = [rows[place] for place in _between(basin.nucleus, end)]
-            numbers = first + np.array(_between(basin.nucleus, end))
-            centers = (numbers - 0.5) * self._spacing
+            centers = (piece[_between(basin.nucleus, end)] - 0.5) * self._spacing
             # Two arms share the block of their nucleation; a single one has all of it.
             half = direction * 0.5 * self._spacing
             start = centers[0] - (half if len(sides) < 2 else 0.0)
@@ -217,7 +221,7 @@ class FrontFinder:
             before = np.array([one.force_before for one in own])
             after = np.array([one.force_after for one in own])
             beyond = end + direction
-            if not 1 <= first + beyond <= self._blocks:
+            if piece[end] == (1 if direction < 0 else self._blocks):
                 arrest = AT_END
             else:
                 arrest = MET if 0 <= beyond < len(rows) else ARRESTED
@@ -271,13 +275,13 @@ def basins(times: Array, resolution: float) -> list[Basin]:
 
 def front_speed(times: Array, positions: Array) -> float:
     """The robust slope of position over time [m/s]: the inverse of the median of all slopes of
-    time over position; NaN of one block, and where blocks broke at one time.
+    time over position; NaN of less than three blocks, and where blocks broke at one time.
 
     Single blocks that broke early or late have no effect, as the slopes of most pairs are those of
     the front.
     """
-    first, second = np.triu_indices(times.size, 1)
-    if not first.size:
+    if times.size < MIN_BLOCKS:
         return float("nan")
+    first, second = np.triu_indices(times.size, 1)
     slowness = np.median((times[second] - times[first]) / (positions[second] - positions[first]))
     return float(1 / slowness) if slowness != 0 else float("nan")

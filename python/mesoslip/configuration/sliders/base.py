@@ -123,6 +123,16 @@ class SliderTable(Table):
         return 0.0
 
     @property
+    def neighbour_spring(self) -> float:
+        """Stiffness of the springs between blocks [N/m]."""
+        return 0.0
+
+    @property
+    def springs_from_above(self) -> bool:
+        """Whether the drive pulls every block, not the first one alone."""
+        return True
+
+    @property
     def block_time(self) -> float:
         """Time of sound over a block [s]."""
         return 0.0

@@ -69,6 +69,10 @@ class InterfaceSlider(SetupDamping, InertialSlider):
         return 0.0 if self.loading == "edge" else self.top_stiffness or 0.0
 
     @property
+    def springs_from_above(self) -> bool:
+        return self.total_top_stiffness > 0
+
+    @property
     def spring_stiffness(self) -> float:
         return self.edge_stiffness + self.total_top_stiffness
 

@@ -80,7 +80,8 @@ contains
          others = parameters
          call make_kind(row%block(block)%contacts, kind, own, others, error)
          if (allocated(error)) return
-         row%has_clocks = row%has_clocks .or. row%block(block)%contacts%has_clocks
+         row%has_clocks = row%block(block)%contacts%has_clocks
+         row%keeps_offers = row%block(block)%contacts%keeps_offers
       end do
       call move_alloc(row, contacts)
    end subroutine make_row

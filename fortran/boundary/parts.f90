@@ -183,10 +183,10 @@ subroutine set_recorder(handle, interval, slip_interval, slip_velocity, quiet_ti
    & layers, blocks, status, message)
    !f2py threadsafe
    use mesoslip_boundary_handles, only: error_type, find_simulation, report, simulation_type
-   use mesoslip_numerics_errors, only: raise, status_invalid, status_memory
+   use mesoslip_numerics_errors, only: raise, status_invalid
    use mesoslip_recording_recorder, only: recorder_parameters_type
    use mesoslip_recording_slips, only: slip_parameters_type
-   use mesoslip_sliders_interface_row, only: block_values
+   use mesoslip_sliders_interface_state, only: block_values
    implicit none
    integer(8), intent(in) :: handle(2)
    !> Interval of the trace, and of the finer traces, 0: no finer traces [s]
@@ -201,13 +201,11 @@ subroutine set_recorder(handle, interval, slip_interval, slip_velocity, quiet_ti
 
    type(simulation_type), pointer :: simulation
    type(error_type), allocatable :: error
-   integer :: stat
 
    call find_simulation(handle, .false., simulation, error)
    if (.not. allocated(error)) then
       if (allocated(simulation%contacts)) then
-         call simulation%ruptures%open(blocks, slip_velocity, quiet_time, stat)
-         if (stat /= 0) call raise(error, status_memory, "not enough memory for the ruptures")
+         call simulation%ruptures%open(blocks, slip_velocity, quiet_time, error)
          call simulation%recorder%open(recorder_parameters_type(interval, duration, &
             & layers + block_values * blocks, &
             & slip_parameters_type(slip_velocity=slip_velocity, quiet_time=quiet_time, &

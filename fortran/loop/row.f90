@@ -31,13 +31,9 @@ contains
          slider%tiny_displacement = tiny_stretch * parameters%static_force / parameters%stiffness
          slider%pinned_stiffness = parameters%stiffness * (parameters%count / slider%blocks)
       end associate
-      contacts%keeps_offers = .true.
+      slider%has_clocks = contacts%has_clocks
       do block = 1, slider%blocks
-         associate (one => contacts%block(block)%contacts)
-            slider%law(block) = one%law()
-            contacts%keeps_offers = contacts%keeps_offers .and. one%keeps_offers
-            slider%has_clocks = slider%has_clocks .or. one%has_clocks
-         end associate
+         slider%block(block)%law = contacts%block(block)%contacts%law()
       end do
       call slider%start(contacts%law())
       slider%sense = slider%drive%direction
@@ -64,6 +60,7 @@ contains
       integer :: block
       logical :: asks
 
+      slider%has_clocks = contacts%has_clocks
       if (.not. contacts%keeps_offers) then
          do block = 1, slider%blocks
             call offer(slider, contacts, block)
@@ -131,7 +128,7 @@ contains
          detached = own%contacts%detached_count
          breaks = own%contacts%breaks
          if (slider%has_clocks) then
-            own%contacts%clock = slider%block_clock(:, block)
+            own%contacts%clock = slider%block(block)%clock
             own%contacts%clock%elapsed = slider%elapsed(:, block)
          end if
          call own%contacts%respond(own%pose, pose)

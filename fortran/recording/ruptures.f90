@@ -1,9 +1,10 @@
 !> The catalogue of ruptures: slips of the blocks of an interface in which most contacts break.
 !>
-!> A block slips while it is faster than the drive by the slip velocity, and until it has been slower
-!> for the quiet time. It ruptures if half of the contacts that were pinned at the start break.
+!> A block slips while it is faster than the drive by the slip velocity, and until it has been
+!> slower for the quiet time. It ruptures if half of its contacts that were pinned at first break.
 module mesoslip_recording_ruptures
    use mesoslip_numerics_archive, only: archive_type
+   use mesoslip_numerics_errors, only: error_type, raise, status_memory
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_numerics_parameters, only: name_length
    use mesoslip_recording_buffer, only: buffer_type
@@ -24,6 +25,17 @@ module mesoslip_recording_ruptures
    !> Time at which nothing has happened
    real(wp), parameter :: never = huge(1.0_wp)
 
+   !> The slip of a block.
+   type :: block_slip_type
+      logical :: is_open = .false.
+      !> When it began, when the block was fast last, and when it ruptured, or never [s]
+      real(wp) :: start_time = 0.0_wp, last_time = 0.0_wp, rupture_time = never
+      !> Force [N], displacement [m] and breaks at the start, breaks at which it ruptures
+      real(wp) :: start_force = 0.0_wp, start_place = 0.0_wp, start_breaks = 0.0_wp, limit = never
+      !> Force [N] and displacement [m] when it was fast last, and maximum of its velocity [m/s]
+      real(wp) :: last_force = 0.0_wp, last_place = 0.0_wp, peak_velocity = 0.0_wp
+   end type block_slip_type
+
    !> Records ruptures.
    type :: rupture_recorder_type
       !> Ruptures that are over
@@ -31,13 +43,7 @@ module mesoslip_recording_ruptures
       !> Velocity above the drive's that is a slip [m/s], and time after which one is over [s]
       real(wp), private :: slip_velocity = 0.0_wp, quiet_time = 0.0_wp
       integer :: blocks = 0
-      !> Whether a block slips; when it did so first and last [s]; when it ruptured, or never
-      logical, allocatable, private :: slips(:)
-      real(wp), allocatable, private :: start_time(:), last_time(:), rupture_time(:)
-      !> Force [N], displacement [m] and breaks at the start, breaks at which it ruptures
-      real(wp), allocatable, private :: start_force(:), start_place(:), start_breaks(:), limit(:)
-      !> Force when it was fast last [N], and maximum of its velocity [m/s]
-      real(wp), allocatable, private :: last_force(:), last_place(:), peak_velocity(:)
+      type(block_slip_type), allocatable, private :: slip(:)
    contains
       procedure, non_overridable :: open, is_full, note_breaks, note_motion, finish, exchange
       procedure, non_overridable, private :: close_slip
@@ -46,26 +52,23 @@ module mesoslip_recording_ruptures
 contains
 
    !> Set up an empty catalogue.
-   subroutine open(self, blocks, slip_velocity, quiet_time, stat)
+   subroutine open(self, blocks, slip_velocity, quiet_time, error)
       class(rupture_recorder_type), intent(inout) :: self
       !> Number of blocks; 0: nothing is recorded
       integer, intent(in) :: blocks
       !> Velocity above the drive's that is a slip [m/s], and time after which one is over [s]
       real(wp), intent(in) :: slip_velocity, quiet_time
-      !> 0 if there is enough memory
-      integer, intent(out) :: stat
+      !> Set if there is not enough memory
+      type(error_type), allocatable, intent(inout) :: error
+
+      integer :: stat
 
       self%blocks = blocks
       self%slip_velocity = slip_velocity
       self%quiet_time = quiet_time
       call self%catalogue%open(rupture_length, merge(blocks + 1, 0, blocks > 0))
-      allocate (self%slips(blocks), source=.false., stat=stat)
-      if (stat /= 0) return
-      allocate (self%start_time(blocks), self%last_time(blocks), self%start_force(blocks), &
-         & self%start_place(blocks), self%start_breaks(blocks), self%last_force(blocks), &
-         & self%last_place(blocks), self%peak_velocity(blocks), source=0.0_wp, stat=stat)
-      if (stat /= 0) return
-      allocate (self%rupture_time(blocks), self%limit(blocks), source=never, stat=stat)
+      allocate (self%slip(blocks), stat=stat)
+      if (stat /= 0) call raise(error, status_memory, "not enough memory for the ruptures")
    end subroutine open
 
    !> Whether the catalogue should be drained.
@@ -83,9 +86,9 @@ contains
       !> Time [s], and breaks so far
       real(wp), intent(in) :: time, breaks
 
-      if (breaks >= self%limit(block)) then
-         self%rupture_time(block) = time
-         self%limit(block) = never
+      if (breaks >= self%slip(block)%limit) then
+         self%slip(block)%rupture_time = time
+         self%slip(block)%limit = never
       end if
    end subroutine note_breaks
 
@@ -98,24 +101,21 @@ contains
       !> Force on the contacts [N], breaks so far, and contacts that are pinned
       real(wp), intent(in) :: force, breaks, pinned
 
-      if (excess > self%slip_velocity) then
-         if (.not. self%slips(block)) then
-            self%slips(block) = .true.
-            self%start_time(block) = time
-            self%start_force(block) = force
-            self%start_place(block) = place
-            self%start_breaks(block) = breaks
-            self%limit(block) = breaks + max(1.0_wp, broken_part * pinned)
-            self%rupture_time(block) = never
-            self%peak_velocity(block) = 0.0_wp
+      associate (slip => self%slip(block))
+         if (excess > self%slip_velocity) then
+            if (.not. slip%is_open) then
+               slip = block_slip_type(is_open=.true., start_time=time, start_force=force, &
+                  & start_place=place, start_breaks=breaks, &
+                  & limit=breaks + max(1.0_wp, broken_part * pinned))
+            end if
+            slip%last_time = time
+            slip%last_force = force
+            slip%last_place = place
+            slip%peak_velocity = max(slip%peak_velocity, excess)
+         else if (slip%is_open .and. time > slip%last_time + self%quiet_time) then
+            call self%close_slip(block, breaks)
          end if
-         self%last_time(block) = time
-         self%last_force(block) = force
-         self%last_place(block) = place
-         self%peak_velocity(block) = max(self%peak_velocity(block), excess)
-      else if (self%slips(block) .and. time > self%last_time(block) + self%quiet_time) then
-         call self%close_slip(block, breaks)
-      end if
+      end associate
    end subroutine note_motion
 
    !> The slip of a block is over: it may have been a rupture.
@@ -124,13 +124,14 @@ contains
       integer, intent(in) :: block
       real(wp), intent(in) :: breaks
 
-      self%slips(block) = .false.
-      self%limit(block) = never
-      if (.not. self%rupture_time(block) < never) return
-      call self%catalogue%add([real(block, wp), self%start_time(block), self%rupture_time(block), &
-         & self%last_time(block), self%start_force(block), self%last_force(block), &
-         & self%last_place(block) - self%start_place(block), self%peak_velocity(block), &
-         & breaks - self%start_breaks(block)])
+      associate (slip => self%slip(block))
+         slip%is_open = .false.
+         slip%limit = never
+         if (.not. slip%rupture_time < never) return
+         call self%catalogue%add([real(block, wp), slip%start_time, slip%rupture_time, &
+            & slip%last_time, slip%start_force, slip%last_force, &
+            & slip%last_place - slip%start_place, slip%peak_velocity, breaks - slip%start_breaks])
+      end associate
    end subroutine close_slip
 
    !> The run is over: so are all slips.
@@ -142,7 +143,7 @@ contains
       integer :: block
 
       do block = 1, self%blocks
-         if (self%slips(block)) call self%close_slip(block, breaks(block))
+         if (self%slip(block)%is_open) call self%close_slip(block, breaks(block))
       end do
    end subroutine finish
 
@@ -156,20 +157,20 @@ contains
       if (self%blocks == 0) return
       call archive%section("ruptures")
       do block = 1, self%blocks
-         call archive%exchange("slips", self%slips(block))
+         associate (slip => self%slip(block))
+            call archive%exchange("is_open", slip%is_open)
+            call archive%exchange("start_time", slip%start_time)
+            call archive%exchange("last_time", slip%last_time)
+            call archive%exchange("rupture_time", slip%rupture_time)
+            call archive%exchange("start_force", slip%start_force)
+            call archive%exchange("start_place", slip%start_place)
+            call archive%exchange("start_breaks", slip%start_breaks)
+            call archive%exchange("limit", slip%limit)
+            call archive%exchange("last_force", slip%last_force)
+            call archive%exchange("last_place", slip%last_place)
+            call archive%exchange("peak_velocity", slip%peak_velocity)
+         end associate
       end do
-      associate (n => [self%blocks, 1])
-         call archive%exchange_fixed("start_time", n, self%start_time)
-         call archive%exchange_fixed("last_time", n, self%last_time)
-         call archive%exchange_fixed("rupture_time", n, self%rupture_time)
-         call archive%exchange_fixed("start_force", n, self%start_force)
-         call archive%exchange_fixed("start_place", n, self%start_place)
-         call archive%exchange_fixed("start_breaks", n, self%start_breaks)
-         call archive%exchange_fixed("limit", n, self%limit)
-         call archive%exchange_fixed("last_force", n, self%last_force)
-         call archive%exchange_fixed("last_place", n, self%last_place)
-         call archive%exchange_fixed("peak_velocity", n, self%peak_velocity)
-      end associate
       call self%catalogue%exchange("catalogue", archive)
    end subroutine exchange
 

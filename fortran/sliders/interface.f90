@@ -5,11 +5,12 @@
 module mesoslip_sliders_interface
    use mesoslip_interface_law, only: clocks, interface_law_type, window_type
    use mesoslip_numerics_archive, only: archive_type
-   use mesoslip_numerics_errors, only: error_type, raise, status_invalid, status_memory
+   use mesoslip_numerics_errors, only: error_type, raise, status_invalid
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_numerics_parameters, only: parameters_type
    use mesoslip_sliders_base, only: exchange_slider, motion_type, shift_law, shift_slider, &
       & slider_type
+   use mesoslip_sliders_interface_rest, only: solve_static
    use mesoslip_sliders_interface_row, only: row_slider_type
    implicit none
    private
@@ -32,7 +33,6 @@ contains
       type(error_type), allocatable, intent(inout) :: error
 
       type(slider_interface_type), allocatable :: self
-      integer :: stat
 
       allocate (self)
       call parameters%take("blocks", self%blocks, error)
@@ -45,14 +45,11 @@ contains
       call parameters%finish(error)
       if (allocated(error)) return
       if (self%blocks < 1 .or. .not. (self%edge_stiffness + self%top_stiffness > 0.0_wp)) then
-         call raise(error, status_invalid, "a row of blocks needs a block and a spring to the drive")
+         call raise(error, status_invalid, "a row needs a block and a spring to the drive")
          return
       end if
-      call self%set_up_row(stat)
-      if (stat /= 0) then
-         call raise(error, status_memory, "not enough memory for the blocks")
-         return
-      end if
+      call self%set_up_row(error)
+      if (allocated(error)) return
       self%has_passages = .true.
       self%own_rate = sqrt((self%edge_stiffness + self%top_stiffness) / self%mass)
       call move_alloc(self, slider)
@@ -65,10 +62,10 @@ contains
 
       real(wp), dimension(self%blocks) :: loaded, pulled, unused
 
-      call self%solve_static([0.0_wp, 0.0_wp], loaded, unused)
-      call self%solve_static([1.0_wp, 0.0_wp], pulled, unused)
+      call solve_static(self, [0.0_wp, 0.0_wp], loaded, unused)
+      call solve_static(self, [1.0_wp, 0.0_wp], pulled, unused)
       self%drive%value = -sum(loaded) / sum(pulled - loaded)
-      call self%solve_static([self%drive%value, 0.0_wp], self%place, self%speed)
+      call solve_static(self, [self%drive%value, 0.0_wp], self%place, self%speed)
       self%speed = 0.0_wp
       self%step_time = self%time
       self%base_time = self%time
@@ -147,8 +144,8 @@ contains
       velocity = self%pulled(2, 2)
    end function pulled_velocity
 
-   !> Displacements, velocities, contact forces and detached contacts of all blocks at the end of the
-   !> step.
+   !> Displacements, velocities, contact forces and detached contacts of all blocks, at the end of
+   !> the step.
    pure subroutine observe_layers(self, time, displacement)
       class(slider_interface_type), intent(in) :: self
       real(wp), intent(in) :: time
@@ -191,8 +188,8 @@ contains
       self%mean(1, :) = self%mean(1, :) - shift
       self%pulled(1, :) = self%pulled(1, :) - shift
       do block = 1, self%blocks
-         call shift_law(self%law(block), shift)
-         associate (window => self%window(block))
+         call shift_law(self%block(block)%law, shift)
+         associate (window => self%block(block)%window)
             if (window%upper < huge(1.0_wp)) window%upper = window%upper - shift
             if (window%lower > -huge(1.0_wp)) window%lower = window%lower - shift
          end associate
@@ -223,7 +220,7 @@ contains
       call archive%exchange_fixed("pulled", [3, 2], self%pulled)
       call archive%exchange_fixed("total_force", [2, 1], self%total_force)
       do block = 1, self%blocks
-         associate (law => self%law(block), window => self%window(block))
+         associate (law => self%block(block)%law, window => self%block(block)%window)
             call archive%exchange("block law stiffness", law%stiffness)
             call archive%exchange("block law offset", law%offset)
             call archive%exchange("block law drag", law%drag)

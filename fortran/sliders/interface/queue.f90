@@ -1,5 +1,6 @@
 !> The next event of each block of a row, and the first of them: a tournament.
 module mesoslip_sliders_interface_queue
+   use mesoslip_numerics_errors, only: error_type, raise, status_memory
    use mesoslip_numerics_kinds, only: wp
    implicit none
    private
@@ -20,22 +21,26 @@ module mesoslip_sliders_interface_queue
 contains
 
    !> Set up a queue without events.
-   subroutine open(self, blocks, stat)
+   subroutine open(self, blocks, error)
       class(event_queue_type), intent(inout) :: self
       integer, intent(in) :: blocks
-      !> 0 if there is enough memory
-      integer, intent(out) :: stat
+      !> Set if there is not enough memory
+      type(error_type), allocatable, intent(inout) :: error
 
-      integer :: block
+      integer :: block, stat
 
       self%leaves = 1
       do while (self%leaves < blocks)
          self%leaves = 2 * self%leaves
       end do
       allocate (self%time(self%leaves), source=huge(1.0_wp), stat=stat)
-      if (stat /= 0) return
-      allocate (self%winner(2 * self%leaves - 1), source=1, stat=stat)
-      if (stat /= 0) return
+      if (stat == 0) then
+         allocate (self%winner(2 * self%leaves - 1), source=1, stat=stat)
+      end if
+      if (stat /= 0) then
+         call raise(error, status_memory, "not enough memory for the events of the blocks")
+         return
+      end if
       do block = 1, self%leaves
          self%winner(self%leaves - 1 + block) = block
       end do

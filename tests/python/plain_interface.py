@@ -1,7 +1,7 @@
 """A plain, slow model of an interface with a length, for tests: fixed steps of Runge and Kutta.
 
-Blocks in a row with equal contacts that keep given thresholds, after section 16 of the model. A step
-in which contacts break or attach is shortened to the first of these events, which is found in the
+Blocks in a row with equal contacts that keep given thresholds (section 16 of the model). A step in
+which contacts break or attach is shortened to the first of these events, which is found in the
 cubic through both ends of the step.
 """
 

@@ -1,4 +1,4 @@
-"""An interface with a length: exact checks of section 16, and a plain code with the same contacts."""
+"""An interface with a length: exact checks of the model, and a plain code of the same contacts."""
 
 from __future__ import annotations
 

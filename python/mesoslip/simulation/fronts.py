@@ -2,8 +2,8 @@
 
 Ruptures of neighbouring blocks whose slips overlap, each with the quiet time after it, are one
 event; between neighbours may be a block that broke in part only. An event is whole if it includes
-both ends, otherwise a precursor. Within an event, minima of the rupture time along the row are nucleations, and each arm from
-a nucleation to where the rupture stops or meets another is a front.
+both ends, otherwise a precursor. Within an event, minima of the rupture time along the row are
+nucleations, and each arm from a nucleation to where the rupture stops or meets another is a front.
 """
 
 from __future__ import annotations
@@ -211,7 +211,8 @@ class FrontFinder:
         ]
         for direction, end in sides or [(1, basin.nucleus)]:
             own = [rows[place] for place in _between(basin.nucleus, end)]
-            centers = (piece[_between(basin.nucleus, end)] - 0.5) * self._spacing
+            numbers = piece[_between(basin.nucleus, end)].astype(float)
+            centers = (numbers - 0.5) * self._spacing
             # Two arms share the block of their nucleation; a single one has all of it.
             half = direction * 0.5 * self._spacing
             start = centers[0] - (half if len(sides) < 2 else 0.0)

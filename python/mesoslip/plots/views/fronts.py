@@ -97,8 +97,8 @@ def draw_fronts(axes: Axes, tree: Tree, picture: Picture, horizontal: Horizontal
     for place, index in enumerate(chosen.tolist()):
         times = shown(np.array([fronts["start_time"][index], fronts["end_time"][index]]))
         ends = np.array([fronts["start_position"][index], fronts["end_position"][index]])
-        label = {} if place else {"label": "front"}
-        axes.plot(times, ends / scale.size, color=RED, linestyle="-", linewidth=1.2, **label)
+        label = "" if place else "front"
+        axes.plot(times, ends / scale.size, color=RED, linestyle="-", linewidth=1.2, label=label)
         ratio = fronts["speed_ratio"][index]
         if chosen.size <= MAX_SPEEDS and np.isfinite(ratio):
             axes.annotate(

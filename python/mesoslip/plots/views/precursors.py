@@ -1,4 +1,4 @@
-"""View of the events of an interface with a length: their lengths against the force of the drive."""
+"""View of the lengths of events of an interface against the force of the drive."""
 
 from __future__ import annotations
 

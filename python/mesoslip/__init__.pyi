@@ -2,6 +2,7 @@ from .analysis.avalanches import avalanche_summary, avalanches
 from .analysis.catalogue_tables import write_table
 from .analysis.events import events
 from .analysis.export import export
+from .analysis.fronts import fronts
 from .analysis.lyapunov import lyapunov
 from .analysis.plateaus import plateaus
 from .analysis.regime import regime
@@ -58,6 +59,7 @@ __all__ = [
     "example",
     "export",
     "fit",
+    "fronts",
     "lyapunov",
     "mean_field",
     "onset",

@@ -99,7 +99,7 @@ def klein_tables(**changes: Any) -> dict[str, Any]:
         if value is None:
             del table[key]
         else:
-            table[key] = value
+            table[key] = copy.deepcopy(value)
     return tables
 
 

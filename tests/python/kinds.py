@@ -26,6 +26,16 @@ PLACES = {"strength": 0.3, "lattice": "triangular", "columns": 8, "rows": 6}
 RIGID = {"mass": 1.47e-3, "stiffness": 97.0, "damping_ratio": 0.2}
 LAYERED = {"kind": "layered", "mass": 1.47e-3, "stiffness": 97.0, "layers": 3}
 BASE = {"mass": 5e-3, "stiffness": 1e4, "damping": 10.0}
+ROW = {
+    "kind": "interface",
+    "blocks": 4,
+    "mass": 1.47e-3,
+    "length": 1e-2,
+    "bar_stiffness": 2000.0,
+    "neighbour_damping": 500.0,
+    "stiffness": 97.0,
+    "damping_ratio": 0.2,
+}
 SNAPSHOTS = {"interaction": PLACES, "output__snapshots": [0.01, 0.03], "output__snapshot_size": 20}
 
 # Contacts that grow stronger but for the strongest of them.
@@ -147,6 +157,9 @@ KINDS: dict[str, dict[str, Any]] = {
     "layered, me": {"slider": LAYERED, "run__engine": "me"},
     "layered, adams": {"slider": LAYERED | {"solver": {"method": "adams"}}},
     "layered, bdf": {"slider": LAYERED | {"solver": {"method": "bdf"}}},
+    "interface": {"slider": ROW},
+    "interface, both": {"slider": ROW | {"loading": "both", "top_stiffness": 50.0}},
+    "interface, me": {"slider": ROW | {"blocks": 3}} | COARSE,
     "quasistatic": {"slider": {"kind": "quasistatic", "stiffness": 97.0}},
     "quasistatic, lattice": {"slider": {"kind": "quasistatic", "stiffness": 97.0}}
     | SNAPSHOTS

@@ -312,14 +312,14 @@ def test_a_load_of_neighbours_must_be_constant():
 
 
 def test_what_ends_early_and_what_separates_is_said():
-    notes = configuration("rigid", **LOAD).load_notes
+    notes = configuration("rigid", **LOAD).notes
     assert notes == ["the normal force falls to 0, where all contacts are separated"]
     stages = [{"duration": 0.05, "normal_force": 2.0}]
     config = configuration("rigid", load={"normal_force": 1.0, "stage": stages})
-    assert config.load_notes == [
+    assert config.notes == [
         "the load ends after 50 ms: its last normal force, 2 N, holds for another 50 ms"
     ]
-    assert configuration("rigid", **VIBRATING).load_notes == []
+    assert configuration("rigid", **VIBRATING).notes == []
 
 
 def test_a_history_is_read_from_a_file(tmp_path):

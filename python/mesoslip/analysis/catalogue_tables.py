@@ -1,22 +1,22 @@
-"""Tables of slips, avalanches, responses, strokes and plateaus as files."""
+"""Tables of slips, avalanches, responses, strokes, plateaus and fronts as files."""
 
 from __future__ import annotations
 
 import xarray as xr
 
-from mesoslip.analysis import avalanches, plateaus, response, slips, strokes
+from mesoslip.analysis import avalanches, fronts, plateaus, response, slips, strokes
 from mesoslip.configuration.reading import PathLike, as_path
 from mesoslip.errors import FileError
 from mesoslip.output.table_files import is_printed, write_printed
 
 
 def write_table(data: xr.Dataset | xr.DataTree, file: PathLike) -> None:
-    """Write what `slips`, `avalanches`, `response`, `strokes` or `plateaus` returned as a table.
+    """Write what `slips`, `avalanches`, `response`, `strokes`, `plateaus` or `fronts` returned.
 
     Parameters
     ----------
     data
-        The catalogue, the response, the strokes, or the plateaus.
+        The catalogue, the response, the strokes, the plateaus, or the fronts.
     file
         The file: ``.tex`` for LaTeX with booktabs, ``.md`` for Markdown, each column in one unit;
         otherwise comma-separated values in SI units.
@@ -45,6 +45,12 @@ def write_table(data: xr.Dataset | xr.DataTree, file: PathLike) -> None:
             write_printed(levels.tables, path)
         else:
             levels.write_csv(path)
+    elif isinstance(data, xr.DataTree) and "fronts" in data.children:
+        catalogue_of_fronts = fronts.fronts_from(data)
+        if for_print:
+            write_printed(catalogue_of_fronts.tables, path)
+        else:
+            catalogue_of_fronts.write_csv(path)
     elif isinstance(data, xr.Dataset) and "slip" in data.dims:
         catalogue = slips.catalogue_from(data)
         if for_print:
@@ -58,5 +64,6 @@ def write_table(data: xr.Dataset | xr.DataTree, file: PathLike) -> None:
             avalanches.write_csv(data, path)
     else:
         raise FileError(
-            f"{path}: is for what mesoslip.slips, avalanches, response, strokes or plateaus returns"
+            f"{path}: is for what mesoslip.slips, avalanches, response, strokes, plateaus or fronts "
+            "returns"
         )

@@ -25,6 +25,7 @@ from mesoslip.command_line import (
     explore,
     export,
     fit,
+    fronts,
     lyapunov,
     mean_field,
     pictures,
@@ -59,6 +60,7 @@ COMMANDS = (
     response.response,
     strokes.strokes,
     plateaus.plateaus,
+    fronts.fronts,
     pictures.plot,
     report.report,
     export.export,
@@ -81,6 +83,7 @@ WITHOUT_XARRAY = {
     response.response,
     strokes.strokes,
     plateaus.plateaus,
+    fronts.fronts,
 }
 
 # How to install the libraries that the kernels are linked to.

@@ -255,9 +255,9 @@ def time_of(text: str, option: str) -> float:
 
 
 def print_caveat(config: Config) -> None:
-    """Print what theory leaves out of the contacts of a configuration."""
+    """Print what theory leaves out of the contacts and the slider of a configuration."""
     from mesoslip.theory.contacts import contact_theory
 
-    caveat = contact_theory(config).caveat
-    if caveat:
-        typer.echo(caveat, err=True)
+    for caveat in (contact_theory(config).caveat, config.slider.caveat):
+        if caveat:
+            typer.echo(caveat, err=True)

@@ -179,7 +179,7 @@ def _report_results(results: Results, config: Config, path: Path) -> None:
     unreached = _unreached_conditions(results, config)
     if unreached:
         say(f"{path}: warning: {unreached}")
-    for note in config.load_notes:
+    for note in config.notes:
         say(f"{path}: {note}")
     if config.continued_drive is not None and known["ending"] == ENDINGS["drive"]:
         say(f"{path}: {config.continued_drive}")

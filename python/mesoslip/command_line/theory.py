@@ -52,7 +52,7 @@ def info(config: ConfigArgument, changes: SetOption = None, as_json: JsonOption 
         verdict(checked),
         checked.unreached_drive,
         checked.continued_drive,
-        *checked.load_notes,
+        *checked.notes,
         checked.unreachable_stop,
         checked.contacts.weak_track,
     ):

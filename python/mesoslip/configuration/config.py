@@ -293,9 +293,10 @@ class Config(Table):
         return self.normal_load or UNLOADED
 
     @property
-    def load_notes(self) -> list[str]:
-        """Messages about a load that ends before the run, or separates all contacts."""
-        return [*self.pressing.notes(self.duration)]
+    def notes(self) -> list[str]:
+        """Messages about a load that ends before the run, or separates all contacts, and about a
+        slider whose keys may not be meant so."""
+        return [*self.pressing.notes(self.duration), *self.slider.notes(self)]
 
     @property
     def unreachable_stop(self) -> str | None:

@@ -281,10 +281,6 @@ def _dataset(
 
 
 def _variable(name: str, dimensions: tuple[str, ...], values: Any) -> xr.Variable:
-    """A variable of `BRANCHES`, with values of its flags."""
-    meaning = variables.BRANCHES[name]
-    found = variables.BRANCHES.variable(name, dimensions, np.array(values, dtype=meaning.dtype))
-    if "flag_meanings" in meaning.further:
-        count = len(meaning.further["flag_meanings"].split())
-        found.attrs["flag_values"] = np.arange(count, dtype=np.int8)
-    return found
+    """A variable of `BRANCHES`."""
+    dtype = variables.BRANCHES[name].dtype
+    return variables.BRANCHES.variable(name, dimensions, np.array(values, dtype=dtype))

@@ -199,7 +199,15 @@ CONTROLS = (
         "kind",
         # A slider under a force needs another drive, which has no knob.
         choices=tuple(name for name, slider in SLIDERS.items() if not slider.takes_forces),
-        required={"layered": {"slider.layers": "8"}},
+        required={
+            "layered": {"slider.layers": "8"},
+            "interface": {
+                "slider.blocks": "8",
+                "slider.length": "10 cm",
+                "slider.bar_stiffness": "2000 N/m",
+                "slider.neighbour_damping": "1000 1/s",
+            },
+        },
     ),
     Control("slider.stiffness", "spring K", 2),
     Control("slider.mass", "mass M", 2),

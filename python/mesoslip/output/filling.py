@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from mesoslip.configuration.config import Config
 from mesoslip.output.layout import DIMENSIONS, Entry, GroupLayout
+from mesoslip.simulation.recorded_tables import BLOCK_NUMBERS as NUMBERS_OF_BLOCK
 
 if TYPE_CHECKING:
     from mesoslip.simulation.run_realizations import Results
@@ -92,6 +93,8 @@ def block_rows(config: Config, table: str) -> int:
         width = 3 * config.contact_kind.site_count(config.contacts)
     elif table == "layers":
         width = config.slider.layer_count
+    elif table == "blocks":
+        width = len(NUMBERS_OF_BLOCK) * config.slider.block_count
     return max(1, min(BLOCK_ROWS, BLOCK_NUMBERS // width))
 
 

@@ -22,6 +22,7 @@ from mesoslip.output.provenance import program_attributes
 from mesoslip.output.variables import Group, Meaning
 from mesoslip.simulation import recorded_tables as tables
 from mesoslip.simulation.audit import failed_checks
+from mesoslip.simulation.fronts import FRONT_COLUMNS
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -37,6 +38,8 @@ DIMENSIONS = {
     "stages": "stage",
     "slip_trace": "sample",
     "avalanches": "avalanche",
+    "ruptures": "rupture",
+    "fronts": "front",
     "snapshot_events": "snapshot",
     "snapshots": "snapshot",
 }
@@ -161,6 +164,10 @@ def describe(results: Results) -> dict[str, GroupLayout]:
     layout["stages"] = _stages(results)
     if config.slip_interval is not None:
         layout["slip_traces"] = _slip_traces(results)
+    if config.slider.block_count:
+        layout["blocks"] = _blocks(results)
+        layout["ruptures"] = _ruptures(results)
+        layout["fronts"] = _fronts(results)
     if config.has_avalanches:
         layout["avalanches"] = _avalanches(results)
     if config.output.snapshots or config.output.snapshot_size:
@@ -240,6 +247,42 @@ def _slip_traces(results: Results) -> GroupLayout:
         group.add_column(name)
     for name, pick in loaded(results.config, "slip_trace", "time", "spring_force").items():
         group.add_column(name, pick)
+    return group.catalogue()
+
+
+def _blocks(results: Results) -> GroupLayout:
+    """The motion of each block at the samples of the trace."""
+    slider = results.config.slider
+    group = _GroupBuilder(results, variables.BLOCKS)
+    numbers = np.arange(1, slider.block_count + 1)
+    group.add("block", ("block",), is_coordinate=True, values=numbers)
+    places = (numbers - 0.5) * slider.block_spacing
+    group.add("position", ("block",), is_coordinate=True, values=places)
+    lengths = [len(one.rows("trace")) for one in results.realizations]
+    has_gaps = min(lengths) < max(lengths)
+    for place, name in enumerate(tables.BLOCK_NUMBERS):
+        part = slice(place * slider.block_count, (place + 1) * slider.block_count)
+
+        def pick(rows: Array, _: Array, part: slice = part) -> Array:
+            return rows[:, part]
+
+        where = ("realization", "time", "block")
+        group.add(name, where, has_gaps=has_gaps, table="blocks", pick=pick)
+    return GroupLayout({"block": slider.block_count}, group.entries, {})
+
+
+def _ruptures(results: Results) -> GroupLayout:
+    group = _GroupBuilder(results, variables.RUPTURES, "ruptures")
+    group.add_column("block_number", "block")
+    for name in tables.RUPTURE_COLUMNS[1:]:
+        group.add_column(name)
+    return group.catalogue()
+
+
+def _fronts(results: Results) -> GroupLayout:
+    group = _GroupBuilder(results, variables.FRONTS, "fronts")
+    for name in FRONT_COLUMNS:
+        group.add_column(name)
     return group.catalogue()
 
 

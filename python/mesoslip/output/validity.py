@@ -31,6 +31,9 @@ NEEDS = {
     "stages": (("stage",), tuple(variables.STAGES)),
     "slip_traces": (("sample",), ("realization_index", "sample_time", *ROOT_NEEDS)),
     "avalanches": (("avalanche",), tuple(variables.AVALANCHES)[:6]),
+    "blocks": (("realization", "time", "block"), tuple(variables.BLOCKS)[2:]),
+    "ruptures": (("rupture",), tuple(variables.RUPTURES)),
+    "fronts": (("front",), tuple(variables.FRONTS)),
     "snapshots": (("snapshot",), tuple(variables.SNAPSHOTS)[:7]),
 }
 

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import DTypeLike
 
+from mesoslip.simulation import fronts
+
 if TYPE_CHECKING:
     import xarray as xr
 
@@ -29,9 +31,13 @@ class Meaning:
     further: Mapping[str, str] = field(default_factory=dict)
 
     @property
-    def attributes(self) -> dict[str, str]:
+    def attributes(self) -> dict[str, Any]:
         """Attributes of the variable."""
-        return {"units": self.units, "long_name": self.long_name, **self.further}
+        found: dict[str, Any] = {"units": self.units, "long_name": self.long_name, **self.further}
+        if "flag_meanings" in self.further:
+            count = len(self.further["flag_meanings"].split())
+            found["flag_values"] = np.arange(count, dtype=np.int8)
+        return found
 
 
 class Estimate(Meaning):
@@ -236,6 +242,56 @@ AVALANCHES = Group(
     generations=Meaning("1", "steps in which contacts of the avalanche triggered others", np.int64),
     spans=Meaning(
         "1", "whether the avalanche breaks contacts in every column or every row", np.int8
+    ),
+)
+
+BLOCKS = Group(
+    block=Meaning("1", "number of the block, 1 at the edge", np.int64),
+    position=Meaning("m", "position of the middle of the block along the interface"),
+    block_displacement=Meaning("m", "displacement of the block"),
+    block_velocity=Meaning("m s-1", "velocity of the block"),
+    block_contact_force=Meaning("N", "force of the block on its contacts"),
+    block_detached_contacts=Meaning(
+        "1", "number of detached contacts of the block", np.int32, is_fractional=True
+    ),
+)
+
+RUPTURES = Group(
+    realization_index=REALIZATION_INDEX,
+    block_number=Meaning("1", "number of the block, 1 at the edge", np.int64),
+    start_time=Meaning("s", "time at which the block became faster than the slip velocity"),
+    rupture_time=Meaning(
+        "s", "time at which half of the contacts that were pinned at the start had broken"
+    ),
+    end_time=Meaning("s", "last time at which the block was faster than the slip velocity"),
+    force_before=Meaning("N", "force of the block on its contacts at the start"),
+    force_after=Meaning("N", "force of the block on its contacts at the end"),
+    slip=Meaning("m", "displacement of the block in its slip"),
+    peak_velocity=Meaning("m s-1", "maximum velocity of the block relative to the drive"),
+    breaks=Meaning("1", "breaks of contacts of the block", np.int64, is_fractional=True),
+)
+
+FRONTS = Group(
+    realization_index=REALIZATION_INDEX,
+    event=Meaning("1", "number of the event within its realization, from 0", np.int64),
+    start_time=Meaning("s", "time of the first rupture of a block in the front"),
+    end_time=Meaning("s", "time of the last rupture of a block in the front"),
+    start_position=Meaning("m", "position at which the front started"),
+    end_position=Meaning("m", "position at which the front ended"),
+    length=Meaning("m", "length of the interface that the front detached"),
+    speed=Meaning(
+        "m s-1", "speed of the front, negative towards the edge; missing if it is not resolved"
+    ),
+    force_drop=Meaning("N", "drop of the force on the contacts of its blocks"),
+    kind=_flags("whether its event reached both ends", " ".join(fronts.KINDS)),
+    passage=Meaning(
+        "1",
+        "passage over its blocks in the event, 0 where they rupture for the first time",
+        np.int64,
+    ),
+    arrest=_flags("where the front ended", " ".join(fronts.ARRESTS)),
+    stress_ratio_before=Meaning(
+        "1", "force on the contacts at the start of the slips of its blocks over their static force"
     ),
 )
 

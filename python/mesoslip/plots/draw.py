@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 NO_OPTIONS = Options()
 # Views of a movie for which none was asked: the first that the output has.
-MOVIES = ("lattice", "layers", "contacts")
+MOVIES = ("lattice", "layers", "fronts", "contacts")
 
 
 class Picture(NamedTuple):

@@ -17,6 +17,7 @@ from mesoslip.configuration.keys import key_kind
 from mesoslip.configuration.load import Load
 from mesoslip.configuration.sliders.base import SliderTable
 from mesoslip.configuration.sliders.force import ForceSlider
+from mesoslip.configuration.sliders.interface import InterfaceSlider
 from mesoslip.configuration.sliders.layered import LayeredSlider
 from mesoslip.configuration.sliders.prescribed import PrescribedSlider
 from mesoslip.configuration.sliders.quasistatic import QuasistaticSlider
@@ -404,6 +405,30 @@ def _layered(slider: LayeredSlider) -> str:
         f"The slider is an elastic block of {slider.layers} layers, with the mass "
         f"M = {quantity(slider.mass, 'kg')} and the static stiffness "
         f"K = {quantity(slider.stiffness, 'N/m')}{damping}.{base}"
+    )
+
+
+@slider_sentence.register
+def _row_of_blocks(slider: InterfaceSlider) -> str:
+    springs = {
+        "edge": f"at the first block, K = {quantity(slider.edge_stiffness, 'N/m')}",
+        "top": f"from above on every block, K_t = {quantity(slider.total_top_stiffness, 'N/m')}",
+        "both": f"at the first block, K = {quantity(slider.edge_stiffness, 'N/m')}, and from above "
+        f"on every block, K_t = {quantity(slider.total_top_stiffness, 'N/m')}",
+    }[slider.loading]
+    bar = damping = ""
+    if slider.blocks > 1:
+        bar = f" and the static stiffness K_b = {quantity(slider.bar_stiffness or 0.0, 'N/m')}"
+    if slider.neighbour_damping and slider.blocks > 1:
+        rate = quantity(slider.neighbour_damping, "1/s")
+        damping = f", with damping between neighbours at the rate {rate}"
+    if slider.damping_rate:
+        rate = quantity(slider.damping_rate, "1/s")
+        damping += f", with damping of velocities relative to their running means, η_S = {rate}"
+    return (
+        f"The slider is a row of {slider.blocks} blocks over {quantity(slider.length, 'm')}, each "
+        f"on its own contacts, with the mass M = {quantity(slider.mass, 'kg')}{bar}{damping}. The "
+        f"drive pulls it {springs}."
     )
 
 

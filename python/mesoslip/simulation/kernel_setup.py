@@ -70,6 +70,7 @@ class KernelSetup:
             "quiet_time": slider.quiet_time,
             "duration": float(ends[-1]),
             "layers": slider.layers_recorded(config),
+            "blocks": slider.block_count,
         }
         self._avalanches: dict[str, Any] = {
             "min_size": float(output.avalanche_size or 1) * config.has_avalanches,
@@ -104,6 +105,7 @@ def tables_of(config: Config) -> tuple[str, ...]:
         "slips": has_slips,
         "slip_trace": has_slips and bool(config.slip_interval),
         "layers": slider.layers_recorded(config) > 0,
+        **dict.fromkeys(("blocks", "ruptures", "fronts"), slider.block_count > 0),
         "avalanches": config.has_avalanches,
         "snapshot_events": has_snapshots,
         "snapshots": has_snapshots,

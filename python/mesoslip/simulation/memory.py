@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mesoslip.errors import ConfigError, Problem
-from mesoslip.simulation.recorded_tables import COLUMNS, SNAPSHOT_NUMBERS
+from mesoslip.simulation.recorded_tables import BLOCK_NUMBERS, COLUMNS, SNAPSHOT_NUMBERS
 
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 # Memory of a run for each row of a table [bytes].
 BYTES_PER_SAMPLE = 3 * 7 * 8
 BYTES_PER_SAMPLE_OF_SLIP = 3 * 10 * 8
-BYTES_PER_LAYER = 2 * 8
+BYTES_PER_NUMBER = 2 * 8
 BYTES_PER_AVALANCHE = 3 * 10 * 8
 BYTES_PER_CONTACT_IN_SNAPSHOT = 3 * 3 * 8
 
@@ -48,7 +48,8 @@ def output_bytes(config: Config, *, has_finer: bool = True) -> float:
     """
     samples = config.expected_duration / config.output_interval + 1
     layers = config.slider.layers_recorded(config)
-    numbers = samples * (len(COLUMNS["trace"]) + layers)
+    blocks = len(BLOCK_NUMBERS) * config.slider.block_count
+    numbers = samples * (len(COLUMNS["trace"]) + layers + blocks)
     numbers += has_finer * finer_samples(config) * len(COLUMNS["slip_trace"])
     snapshots = len(config.output.snapshots) * config.contacts.count
     numbers += snapshots * len(SNAPSHOT_NUMBERS)
@@ -65,7 +66,9 @@ def check_memory(config: Config, available: float | None = None) -> None:
     owner = "the machine has" if available is None else "it may take"
     together = min(run.realizations, os.cpu_count() or 1)
     in_catalogue = (run.avalanches or 0) if output.avalanche_size is None else 0
-    per_sample = BYTES_PER_SAMPLE + BYTES_PER_LAYER * config.slider.layers_recorded(config)
+    slider = config.slider
+    further = slider.layers_recorded(config) + len(BLOCK_NUMBERS) * slider.block_count
+    per_sample = BYTES_PER_SAMPLE + BYTES_PER_NUMBER * further
     finer = finer_samples(config)
     sites = config.contact_kind.site_count(contacts)
     lattices = BYTES_PER_CONTACT_IN_SNAPSHOT * sites * run.realizations

@@ -17,6 +17,7 @@ import numpy as np
 from mesoslip.configuration import arguments
 from mesoslip.configuration.config import Config
 from mesoslip.errors import RunError
+from mesoslip.simulation.fronts import FrontFinder
 from mesoslip.simulation.kernel import Array, Kernel, Words
 from mesoslip.simulation.kernel_setup import KernelSetup, tables_of
 from mesoslip.simulation.memory import check_memory
@@ -187,6 +188,7 @@ class Realization(Recorded):
         self._start = START
         self._energy: Array | None = None
         self._recorded = tables_of(config)
+        self._fronts = front_finder(config)
         self._setup: KernelSetup | None = None
         self._kernel: Kernel | None = None
         self._words: Words | None = None
@@ -207,6 +209,7 @@ class Realization(Recorded):
         """Another realization, of which neither has started."""
         other = object.__new__(type(self))
         other.__dict__.update(self.__dict__, number=number, _tables={}, _lock=threading.Lock())
+        other._fronts = front_finder(self.config)
         return other
 
     def _open(self) -> Kernel:
@@ -344,8 +347,10 @@ class Realization(Recorded):
         with self._lock:
             for table, rows in kernel.drain(*self._recorded).items():
                 values = self._start.rows_since(table, rows)
-                if len(values):
-                    self._tables.setdefault(table, Rows(values.shape[1])).add(values)
+                self._add(table, values)
+                if table == "ruptures" and self._fronts is not None:
+                    is_last = bool(progress.ending)
+                    self._add("fronts", self._fronts.add(values, is_last=is_last))
             self.time = progress.time
             self.breaks = progress.breaks
             if self.config.contact_kind.is_discrete:
@@ -360,6 +365,11 @@ class Realization(Recorded):
             self.integrator_counts = progress.integrator_counts.copy()
             self.ending = ENDINGS[progress.ending]
             self._energy = self._start.energy_since(kernel.energy()) if self.ending else None
+
+    def _add(self, table: str, values: Array) -> None:
+        """Add rows of a table."""
+        if len(values):
+            self._tables.setdefault(table, Rows(values.shape[1])).add(values)
 
     def close(self) -> None:
         """Free the memory of the kernel, when the run is not continued."""
@@ -459,6 +469,8 @@ class Realization(Recorded):
             "energy": None if self._energy is None else self._energy.tolist(),
             "columns": {table: rows.columns for table, rows in self._tables.items()},
         }
+        if self._fronts is not None:
+            scalars["fronts"] = self._fronts.save()
         counts = {table: len(rows) for table, rows in self._tables.items()}
         return Saved(scalars, counts, words)
 
@@ -473,3 +485,20 @@ class Realization(Recorded):
         self._lacks_errors = self._lacks_errors and math.isnan(self.force_error)
         self._words = saved.words
         self._tables = tables
+        if self._fronts is not None:
+            self._fronts.restore(saved.scalars["fronts"])
+
+
+def front_finder(config: Config) -> FrontFinder | None:
+    """What finds fronts of a slider of blocks; None for others."""
+    slider, load = config.slider, config.pressing
+    if not slider.block_count:
+        return None
+    force = config.contacts.static_force / slider.block_count / load.normal_force
+    return FrontFinder(
+        slider.block_count,
+        slider.block_spacing,
+        slider.block_time,
+        slider.quiet_time,
+        lambda times: force * load.force_at(times),
+    )

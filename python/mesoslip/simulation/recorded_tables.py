@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from mesoslip.errors import RunError, shown
 from mesoslip.execution.regular_files import open_regular
+from mesoslip.simulation.fronts import FRONT_COLUMNS
 from mesoslip.simulation.kernel import name_list
 
 Array = NDArray[np.float64]
@@ -24,6 +25,7 @@ TRACE_COLUMNS = name_list("trace")
 SLIP_COLUMNS = name_list("slips")
 STAGE_COLUMNS = name_list("stages")
 AVALANCHE_COLUMNS = name_list("avalanches")
+RUPTURE_COLUMNS = name_list("ruptures")
 SNAPSHOT_COLUMNS = name_list("snapshot_events")
 # Numbers of each contact in a snapshot, and at present.
 SNAPSHOT_NUMBERS = name_list("snapshots")
@@ -31,18 +33,26 @@ CONTACT_COLUMNS = name_list("contacts")
 ENERGY_COLUMNS = name_list("energy")
 
 # Columns by table. The width of the tables without named columns depends on the run: displacements
-# of all layers, numbers of all contacts.
+# of all layers, numbers of all blocks and of all contacts.
 COLUMNS: dict[str, tuple[str, ...]] = {
     "trace": TRACE_COLUMNS,
     "slip_trace": name_list("slip_trace"),
     "slips": SLIP_COLUMNS,
     "stages": STAGE_COLUMNS,
     "layers": (),
+    "blocks": (),
+    "ruptures": RUPTURE_COLUMNS,
     "avalanches": AVALANCHE_COLUMNS,
     "snapshot_events": SNAPSHOT_COLUMNS,
     "snapshots": (),
+    "fronts": FRONT_COLUMNS,
 }
 TABLES = tuple(COLUMNS)
+# Numbers of each block in a row of the table of blocks, each for all blocks one after another.
+BLOCK_NUMBERS = (
+    *("block_displacement", "block_velocity", "block_contact_force"),
+    "block_detached_contacts",
+)
 
 # Sentinel: the stretch of a detached contact.
 DETACHED = 1e300
@@ -226,7 +236,8 @@ class Recorded:
         ----------
         name
             "trace" (samples at fixed intervals), "slips", "slip_trace" (finer samples around
-            slips), "stages" (completed stages of the drive), "avalanches", or "snapshot_events".
+            slips), "stages" (completed stages of the drive), "avalanches", "snapshot_events",
+            "ruptures" and "fronts" (of an interface with a length).
 
         Returns
         -------

@@ -16,7 +16,7 @@ from mesoslip.errors import ConfigError, Problem
 from mesoslip.simulation.archive import Archive
 from mesoslip.simulation.kernel import Array, Kernel, Progress, Words
 from mesoslip.simulation.kernel_setup import KernelSetup
-from mesoslip.simulation.recorded_tables import COLUMNS, ENERGY_COLUMNS
+from mesoslip.simulation.recorded_tables import BLOCK_NUMBERS, COLUMNS, ENERGY_COLUMNS
 
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
@@ -71,6 +71,11 @@ class Start:
             return rows
         if table == "layers":
             return rows - self.progress.displacement
+        if table == "blocks":
+            count = rows.shape[1] // len(BLOCK_NUMBERS)
+            return np.concatenate(
+                [rows[:, :count] - self.progress.displacement, rows[:, count:]], axis=1
+            )
         shift = np.array([self._shift(table, name) for name in COLUMNS[table]])
         return rows - shift if shift.size else rows
 

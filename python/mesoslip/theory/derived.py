@@ -73,7 +73,8 @@ def _drive(config: Config) -> Iterator[tuple[str, float, str, str]]:
 def verdict(config: Config) -> str | None:
     """Predictions for the motion, and their limits; None without a spring."""
     sliding, theory = steady_sliding(config, MAX_WORK), contact_theory(config)
-    sentences: tuple[str | None, ...] = (_verdict_of_stiffness(config), theory.caveat)
+    caveats = (theory.caveat, config.slider.caveat)
+    sentences: tuple[str | None, ...] = (_verdict_of_stiffness(config), *caveats)
     if sliding is not None:
         # Contacts without a force curve have no K*, but a limit at each velocity.
         limit = sliding.limit if theory.depends_on_velocity else None

@@ -33,7 +33,7 @@ from mesoslip.theory.frequency_paths import (
     counting_path,
     search_path,
 )
-from mesoslip.theory.sliders import dynamic_stiffness
+from mesoslip.theory.sliders import dynamic_stiffness, stability_problems
 
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
@@ -82,6 +82,7 @@ class LinearStability(abc.ABC):
     def __init__(self, config: Config, velocity: float | None = None) -> None:
         contacts = config.contacts
         problems = [*self._problems(config), *steady_problems(config)]
+        problems += stability_problems(config.slider)
         if config.slider.layer_count > MAX_LAYERS:
             message = f"linear stability is found for at most {MAX_LAYERS}"
             problems.append(Problem("", "slider.layers", message, config.slider.layer_count))

@@ -12,9 +12,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from mesoslip.configuration.sliders.base import SliderTable
 from mesoslip.configuration.sliders.inertial import InertialSlider
+from mesoslip.configuration.sliders.interface import InterfaceSlider
 from mesoslip.configuration.sliders.layered import LayeredSlider
 from mesoslip.configuration.sliders.quasistatic import QuasistaticSlider
 from mesoslip.configuration.sliders.rigid import RigidSlider
+from mesoslip.errors import Problem
 from mesoslip.theory.quantity import Quantity
 
 if TYPE_CHECKING:
@@ -46,14 +48,28 @@ def dynamic_stiffness(slider: SliderTable, rate: Complex) -> DynamicStiffness | 
 
 
 @dynamic_stiffness.register
-def _rigid_stiffness(slider: RigidSlider, rate: Any) -> DynamicStiffness:
-    """M λ² + K + M η_S λ²/(λ + η_S) (S40, S41)."""
-    free = slider.mass * rate**2 + slider.stiffness
+def _rigid_stiffness(slider: RigidSlider | InterfaceSlider, rate: Any) -> DynamicStiffness:
+    """M λ² + K + M η_S λ²/(λ + η_S) (S40, S41); of blocks that move together."""
+    free = slider.mass * rate**2 + slider.spring_stiffness
     damping = slider.damping_rate
     if damping == 0:
         return DynamicStiffness(free, rate**0, 2)
     mean = rate + damping
     return DynamicStiffness(free * mean + slider.mass * damping * rate**2, mean, 3)
+
+
+@singledispatch
+def stability_problems(slider: SliderTable) -> list[Problem]:  # noqa: ARG001
+    """The keys of a slider for which there is no theory of steady sliding."""
+    return []
+
+
+@stability_problems.register
+def _interface_problems(slider: InterfaceSlider) -> list[Problem]:
+    if slider.moves_as_one:
+        return []
+    message = 'has no theory of stability: blocks move together with "top" only'
+    return [Problem("", "slider.loading", message, slider.loading)]
 
 
 @dynamic_stiffness.register
@@ -115,7 +131,7 @@ def loading_rate(slider: SliderTable, config: Config) -> float | None:  # noqa: 
 def _inertial_loading_rate(slider: InertialSlider, config: Any) -> float | None:
     if config.drive_speed == 0:
         return None
-    root = math.sqrt(slider.stiffness * slider.mass)
+    root = math.sqrt(slider.spring_stiffness * slider.mass)
     return float(config.drive_speed * root / config.contacts.static_force)
 
 
@@ -138,6 +154,44 @@ def _quasistatic_quantities(slider: QuasistaticSlider, config: Any) -> Iterator[
 
 @quantities.register
 def _rigid_quantities(slider: RigidSlider, config: Any) -> Iterator[Quantity]:
+    yield Quantity("damping_rate", slider.damping_rate, "1/s", "setup damping, eta_S")
+    yield from _inertial_quantities(slider, config)
+
+
+@quantities.register
+def _interface_quantities(slider: InterfaceSlider, config: Any) -> Iterator[Quantity]:
+    contacts = config.contacts
+    block = contacts.stiffness / slider.blocks
+    yield Quantity("block_spacing", slider.block_spacing, "m", "distance of blocks, a")
+    yield Quantity("block_mass", slider.block_mass, "kg", "mass of a block, m_b = M/N_b")
+    if slider.blocks > 1:
+        spring, neighbour = slider.neighbour_spring, slider.neighbour_frequency
+        yield Quantity("neighbour_spring", spring, "N/m", "spring of neighbours, k_b = K_b N_b")
+        sound = slider.sound_velocity
+        yield Quantity("sound_velocity", sound, "m/s", "sound in the row, c = a (k_b/m_b)^(1/2)")
+        yield Quantity("block_time", 1 / neighbour, "s", "time of sound over a block, a/c")
+        crossing = slider.blocks / neighbour
+        yield Quantity("crossing_time", crossing, "s", "time of sound over the interface")
+        yield Quantity(
+            "decay_length",
+            slider.block_spacing * math.sqrt(spring / block),
+            "m",
+            "length in which a static load of the pinned row decays, Lambda = a (k_b/k')^(1/2)",
+        )
+        highest = math.sqrt(4 * neighbour**2 + block / slider.block_mass)
+        yield Quantity("pinned_frequency_highest", highest, "1/s", "highest of the pinned row")
+        yield Quantity(
+            "drive_ratio",
+            slider.spring_stiffness / (slider.bar_stiffness or math.inf),
+            "1",
+            "springs of the drive over the row of blocks, (K + K_t)/K_b",
+        )
+        yield Quantity(
+            "contact_ratio",
+            contacts.stiffness / (slider.bar_stiffness or math.inf),
+            "1",
+            "stiffness of the contacts over that of the row, Nk/K_b = (length/Lambda)^2",
+        )
     yield Quantity("damping_rate", slider.damping_rate, "1/s", "setup damping, eta_S")
     yield from _inertial_quantities(slider, config)
 
@@ -203,7 +257,7 @@ def _first_slip(slider: InertialSlider, config: Config, film: float) -> Iterator
     d_1 = loading_rate(slider, config)
     if not d_1:
         return
-    loading = contacts.static_force / slider.stiffness / config.drive_speed
+    loading = contacts.static_force / slider.spring_stiffness / config.drive_speed
     yield Quantity(
         "loading_time", loading, "s", "time in which the spring alone loads to F_s, F_s/(K v_d)"
     )

@@ -37,6 +37,8 @@ class Block(Protocol):
     def ignores_delay(self) -> bool: ...
     @property
     def jumps(self) -> bool: ...
+    @property
+    def contact_parameters(self) -> Parameters: ...
 
 
 class Setting(Protocol):
@@ -190,6 +192,7 @@ def common_parameters(config: Setting) -> Parameters:
         "newborn_width": contacts.newborn_width,
         "coupling": contacts.coupling,
         "reattach": int(contacts.reattach),
+        **config.slider.contact_parameters,
         **contacts.threshold.kernel_parameters,
         **_kept(contacts),
         **_track(contacts),

@@ -11,6 +11,7 @@ from pydantic import Discriminator, Tag
 
 from mesoslip.configuration.sliders.base import SliderTable
 from mesoslip.configuration.sliders.force import ForceSlider
+from mesoslip.configuration.sliders.interface import InterfaceSlider
 from mesoslip.configuration.sliders.layered import LayeredSlider
 from mesoslip.configuration.sliders.prescribed import PrescribedSlider
 from mesoslip.configuration.sliders.quasistatic import QuasistaticSlider
@@ -22,6 +23,7 @@ KINDS: tuple[type[SliderTable], ...] = (
     PrescribedSlider,
     QuasistaticSlider,
     ForceSlider,
+    InterfaceSlider,
 )
 
 # By name; the first kind is the default.

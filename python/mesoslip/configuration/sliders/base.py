@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from typing import ClassVar, NamedTuple, Protocol
+from collections.abc import Iterator
+from typing import ClassVar, NamedTuple, Protocol, TypeAlias
 
 from mesoslip.configuration.contacts.base import ContactKind
 from mesoslip.configuration.contacts.tables import Contacts
 from mesoslip.configuration.drive import Drive
+from mesoslip.configuration.kernel_parameters import Parameters
 from mesoslip.configuration.run_tables import Output
 from mesoslip.configuration.table import Complaints, Table
+
+# Messages about a configuration that is right, but may not be what is meant.
+Notes: TypeAlias = Iterator[str]
 
 
 class Oscillator(NamedTuple):
@@ -107,6 +112,37 @@ class SliderTable(Table):
         return 1
 
     @property
+    def block_count(self) -> int:
+        """Number of blocks with contacts of their own, whose motion is recorded; 0 for a slider of
+        one displacement."""
+        return 0
+
+    @property
+    def block_spacing(self) -> float:
+        """Distance of neighbouring blocks [m]."""
+        return 0.0
+
+    @property
+    def neighbour_spring(self) -> float:
+        """Stiffness of the springs between blocks [N/m]."""
+        return 0.0
+
+    @property
+    def springs_from_above(self) -> bool:
+        """Whether the drive pulls every block, not the first one alone."""
+        return True
+
+    @property
+    def block_time(self) -> float:
+        """Time of sound over a block [s]."""
+        return 0.0
+
+    @property
+    def contact_parameters(self) -> Parameters:
+        """Parameters that the kernel's contacts have of the slider."""
+        return {}
+
+    @property
     def extra_traces(self) -> tuple[str, ...]:
         """Names of traces of this kind only."""
         return ()
@@ -127,6 +163,15 @@ class SliderTable(Table):
     def remedy(self) -> str:
         """Advice for runs with a larger residual."""
         return ""
+
+    @property
+    def caveat(self) -> str | None:
+        """Limits of theory that knows a rigid slider only; None if there are none."""
+        return None
+
+    def notes(self, config: Setting) -> Notes:  # noqa: ARG002
+        """Messages about keys that may not be meant so."""
+        yield from ()
 
     def problems(self, config: Setting) -> Complaints:  # noqa: ARG002
         """The combinations that this kind refuses."""

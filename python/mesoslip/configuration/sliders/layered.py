@@ -16,7 +16,7 @@ from pydantic import (
 
 from mesoslip import _core
 from mesoslip.configuration.sliders.base import Setting
-from mesoslip.configuration.sliders.inertial import InertialSlider
+from mesoslip.configuration.sliders.inertial import SpringSlider
 from mesoslip.configuration.table import (
     Complaint,
     Complaints,
@@ -104,7 +104,7 @@ class Cantilever(Table):
 RESIDUAL_OVER_TOLERANCE = 1e4
 
 
-class LayeredSlider(InertialSlider):
+class LayeredSlider(SpringSlider):
     """An elastic block of layers joined by springs; the first layer carries the contacts.
 
     The damping force is γ M/N_l times the relative velocity of neighbouring layers, with the

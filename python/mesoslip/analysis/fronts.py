@@ -1,0 +1,387 @@
+"""The fronts of an interface with a length: catalogues of fronts and events, their statistics."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mesoslip.analysis.avalanche_sizes import PowerLawFit, fit_power_law
+from mesoslip.configuration.config import Config
+from mesoslip.errors import FileError
+from mesoslip.output.access import config_of, group_of
+from mesoslip.output.arrays import Tree
+from mesoslip.output.inputs import OutputLike, opened_run_arrays
+from mesoslip.output.table_files import PrintedTable
+from mesoslip.output.targets import written_whole
+from mesoslip.output.variables import FRONTS, Group, Meaning
+from mesoslip.quantities import column, number, with_error
+from mesoslip.simulation.fronts import ARRESTED, ARRESTS, KINDS, PRECURSOR
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Array = NDArray[np.float64]
+
+NO_FRONTS = 'the output has no fronts: they are recorded with slider.kind = "interface"'
+
+# Columns of fronts that are not in the group of an output.
+ALL_FRONTS = Group(
+    FRONTS,
+    speed_ratio=Meaning("1", "size of the speed over that of sound in the row of blocks"),
+)
+EVENTS = Group(
+    FRONTS.subset("realization_index", "event", "start_time", "end_time", "kind"),
+    front_count=Meaning("1", "fronts of the event", np.int64),
+    block_count=Meaning("1", "blocks that ruptured", np.int64),
+    length=Meaning("m", "length of the interface that detached"),
+    nucleation_position=Meaning("m", "position of the first nucleation"),
+    force_drop=FRONTS["force_drop"],
+    spring_force=Meaning("N", "force of the drive before the event"),
+    stress_ratio_before=FRONTS["stress_ratio_before"],
+)
+# Printed columns: header, and SI unit.
+EVENT_HEADS = {
+    "event": ("event", "1"),
+    "start_time": ("start", "s"),
+    "kind": ("kind", ""),
+    "front_count": ("fronts", "1"),
+    "length": ("length", "m"),
+    "nucleation_position": ("from", "m"),
+    "force_drop": ("force drop", "N"),
+    "spring_force": ("spring force", "N"),
+    "stress_ratio_before": ("stress ratio", "1"),
+}
+FRONT_HEADS = {
+    "event": ("event", "1"),
+    "start_time": ("start", "s"),
+    "kind": ("kind", ""),
+    "start_position": ("from", "m"),
+    "end_position": ("to", "m"),
+    "speed": ("speed", "m/s"),
+    "speed_ratio": ("speed/c", "1"),
+    "stress_ratio_before": ("stress ratio", "1"),
+    "arrest": ("end", ""),
+}
+WORDS = {"kind": KINDS, "arrest": ARRESTS}
+DIGITS = 4
+
+
+@dataclass(frozen=True)
+class Fronts:
+    """Fronts and events of an output; columns in SI, each of shape (rows,)."""
+
+    fronts: Mapping[str, NDArray[Any]]
+    events: Mapping[str, NDArray[Any]]
+    sound_velocity: float
+    """c [m/s]; NaN for a single block."""
+    blocks: int
+
+    @property
+    def statistics(self) -> dict[str, dict[str, float]]:
+        """Of each kind: events, fronts, arrested fronts; median length and speed over c of the
+        first passages, and their quartiles."""
+        result = {}
+        for value, kind in enumerate(KINDS):
+            of_kind = self.fronts["kind"] == value
+            first = of_kind & (self.fronts["passage"] == 0)
+            row = {
+                "events": float(np.sum(self.events["kind"] == value)),
+                "fronts": float(np.sum(of_kind)),
+                "arrested": float(
+                    np.sum(self.fronts["arrest"][of_kind] == ARRESTS.index(ARRESTED))
+                ),
+            }
+            for name in ("length", "speed_ratio", "stress_ratio_before"):
+                values = self.fronts[name][first]
+                values = values[np.isfinite(values)]
+                if values.size:
+                    low, middle, high = np.quantile(values, [0.25, 0.5, 0.75]).tolist()
+                    row |= {f"{name}_25": low, name: middle, f"{name}_75": high}
+            result[kind] = row
+        return result
+
+    def size_fit(self) -> PowerLawFit | None:
+        """The power law of the numbers of blocks in precursors; None with too few of them."""
+        sizes = self.events["block_count"][self.events["kind"] == KINDS.index(PRECURSOR)]
+        return fit_power_law(sizes, max_size=self.blocks - 1) if sizes.size > 1 else None
+
+    @property
+    def tables(self) -> list[PrintedTable]:
+        """Statistics by kind, events, and fronts, for print."""
+        return [
+            self._statistics_table(),
+            _table("Events", self.events, EVENT_HEADS),
+            _table("Fronts", self.fronts, FRONT_HEADS),
+        ]
+
+    def _statistics_table(self) -> PrintedTable:
+        lengths = [one.get("length", np.nan) for one in self.statistics.values()]
+        shown = column(lengths, "m", DIGITS)
+        heads = (
+            "",
+            "events",
+            "fronts",
+            "arrested",
+            shown.head("length"),
+            "speed/c",
+            "stress ratio",
+        )
+        rows = []
+        for kind, one in self.statistics.items():
+            ranges = [
+                f"{number(one[name], 3)} ({number(one[f'{name}_25'], 3)} to "
+                f"{number(one[f'{name}_75'], 3)})"
+                if name in one
+                else "-"
+                for name in ("speed_ratio", "stress_ratio_before")
+            ]
+            length = shown.text(one["length"]) if "length" in one else "-"
+            counts = [f"{one[name]:.0f}" for name in ("events", "fronts", "arrested")]
+            rows.append((kind, *counts, length, *ranges))
+        return PrintedTable("Medians of first passages (quartiles)", tuple(heads), tuple(rows))
+
+    def size_sentence(self) -> str | None:
+        """The fitted law of the sizes of precursors; None without one."""
+        fit = self.size_fit()
+        if fit is None:
+            return None
+        text = (
+            f"blocks in precursors: exponent {with_error(fit.exponent, fit.exponent_error)} from "
+            f"{fit.min_size} blocks on, {fit.count} precursors"
+        )
+        if fit.is_rejected:
+            text += f"; they do not follow the law (p = {fit.p_value:.2g})"
+        return text
+
+    def rows(self, group: str) -> list[dict[str, Any]]:
+        """A dictionary for each front or event; None for unknown values, kinds as words."""
+        columns = self.fronts if group == "fronts" else self.events
+        lists = [
+            [WORDS[name][value] for value in values.tolist()] if name in WORDS else values.tolist()
+            for name, values in columns.items()
+        ]
+        return [
+            {
+                name: None if value != value else value
+                for name, value in zip(columns, row, strict=True)
+            }
+            for row in zip(*lists, strict=True)
+        ]
+
+    def to_json(self) -> dict[str, Any]:
+        """Everything as nested lists and numbers."""
+        fit = self.size_fit()
+        found: dict[str, Any] = {
+            "sound_velocity": None if np.isnan(self.sound_velocity) else self.sound_velocity,
+            "statistics": self.statistics,
+            "fronts": self.rows("fronts"),
+            "events": self.rows("events"),
+        }
+        if fit is not None:
+            found["size_fit"] = {
+                "exponent": fit.exponent,
+                "exponent_error": fit.exponent_error,
+                "min_size": fit.min_size,
+                "count": fit.count,
+                "p_value": fit.p_value,
+            }
+        return found
+
+    def write_csv(self, path: Path) -> None:
+        """Write fronts and events as two tables, with an empty line between them."""
+        with written_whole(path) as part, part.open("w", newline="", encoding="utf-8") as file:
+            for place, (group, meanings) in enumerate((("fronts", ALL_FRONTS), ("events", EVENTS))):
+                file.write("\n" if place else "")
+                writer = csv.DictWriter(file, list(meanings))
+                writer.writerow({name: f"{name} [{one.units}]" for name, one in meanings.items()})
+                writer.writerows(self.rows(group))
+
+
+def _table(
+    title: str, columns: Mapping[str, NDArray[Any]], heads: Mapping[str, tuple[str, str]]
+) -> PrintedTable:
+    cells: list[tuple[str, ...]] = []
+    if columns["realization_index"].any():
+        cells.append(("realization", *map(str, columns["realization_index"].tolist())))
+    for name, (head, unit) in heads.items():
+        values = columns[name]
+        if name in WORDS:
+            words = (WORDS[name][one].replace("_", " ") for one in values.tolist())
+            cells.append((head, *words))
+        elif values.dtype.kind == "i":
+            cells.append((head, *map(str, values.tolist())))
+        else:
+            shown = column(values.tolist(), unit, 7 if name == "start_time" else DIGITS)
+            cells.append((shown.head(head), *map(shown.text, values.tolist())))
+    names, *rows = zip(*cells, strict=True)
+    return PrintedTable(title, names, tuple(rows))
+
+
+def fronts_of(tree: Tree, name: str = "the output", realization: int | None = None) -> Fronts:
+    """The fronts of all realizations of an output, or of one."""
+    if "fronts" not in tree.children:
+        raise FileError(f"{name}: {NO_FRONTS}")
+    slider = config_of(tree, name).slider
+    data = group_of(tree, "fronts")
+    columns = {one: np.asarray(data[one].values) for one in FRONTS}
+    if realization is not None:
+        mine = columns["realization_index"] == realization
+        columns = {one: values[mine] for one, values in columns.items()}
+    sound = slider.block_spacing / slider.block_time if slider.block_time > 0 else np.nan
+    columns["speed_ratio"] = np.abs(columns["speed"]) / sound
+    events = _events(tree, columns, slider.block_spacing)
+    return Fronts(columns, events, sound, slider.block_count)
+
+
+def _events(
+    tree: Tree, fronts: Mapping[str, NDArray[Any]], spacing: float
+) -> dict[str, NDArray[Any]]:
+    """Columns of the events."""
+    owners = np.stack([fronts["realization_index"], fronts["event"]], axis=1)
+    ends = np.append(np.flatnonzero(np.any(np.diff(owners, axis=0), axis=1)) + 1, len(owners))
+    rows = [
+        _event({name: values[start:end] for name, values in fronts.items()}, spacing)
+        for start, end in zip(np.append(0, ends[:-1]), ends, strict=True)
+        if end > start
+    ]
+    found = {
+        name: np.array([one.get(name, np.nan) for one in rows], dtype=meaning.dtype)
+        for name, meaning in EVENTS.items()
+    }
+    found["spring_force"][:] = _spring_forces(tree, found)
+    return found
+
+
+def _event(own: Mapping[str, NDArray[Any]], spacing: float) -> dict[str, float]:
+    is_first = own["passage"] == 0
+    length = float(own["length"][is_first].sum())
+    return {
+        **{name: own[name][0] for name in ("realization_index", "event", "kind")},
+        "start_time": own["start_time"].min(),
+        "end_time": own["end_time"].max(),
+        "front_count": is_first.size,
+        "block_count": round(length / spacing),
+        "length": length,
+        "nucleation_position": own["start_position"][np.argmin(own["start_time"])],
+        "force_drop": own["force_drop"].sum(),
+        "stress_ratio_before": np.average(
+            own["stress_ratio_before"][is_first], weights=own["length"][is_first]
+        ),
+    }
+
+
+def _spring_forces(tree: Tree, events: Mapping[str, NDArray[Any]]) -> Array:
+    """Force of the drive at the last sample before each event [N]."""
+    root = tree.to_dataset()
+    times = root["time"].values
+    forces = np.full(events["start_time"].size, np.nan)
+    for realization in np.unique(events["realization_index"]).tolist():
+        mine = np.flatnonzero(events["realization_index"] == realization)
+        trace = root["spring_force"].isel(realization=realization).values
+        place = np.searchsorted(times, events["start_time"][mine], "right") - 1
+        forces[mine] = trace[np.maximum(place, 0)]
+    return forces
+
+
+def static_balance(config: Config, residual: float) -> Array | None:
+    """Force of the spring at the edge [N] at which a rupture of the first 0, 1, ... blocks goes on.
+
+    The ruptured blocks bear ``residual`` times their static force. The pinned blocks ahead bear the
+    rest, the first of them its static force F_s/N_b, the others less: displacements are
+    proportional to cosh(κ (N_b - j + 1/2)) with 2 (cosh κ - 1) = k'/k_b, as in a row with a free
+    end. So F(n)/F_s = (residual n + Σ_{j>n} cosh(κ (N_b - j + 1/2))/cosh(κ (N_b - n - 1/2)))/N_b;
+    for Λ ≫ a it is residual ℓ/L + Λ/L tanh((L - ℓ)/Λ). None with springs from above.
+    """
+    slider, contacts = config.slider, config.contacts
+    blocks = slider.block_count
+    if blocks < 2 or slider.springs_from_above:
+        return None
+    ratio = contacts.stiffness / blocks / slider.neighbour_spring
+    decay = 2 * np.arcsinh(np.sqrt(ratio) / 2)
+    from_end = np.arange(blocks)[::-1] + 0.5
+    # cosh(κ x)/cosh(κ y) without overflow.
+    forces = [
+        residual * n
+        + float(
+            np.sum(
+                np.exp(decay * (from_end[n:] - from_end[n]))
+                * (1 + np.exp(-2 * decay * from_end[n:]))
+                / (1 + np.exp(-2 * decay * from_end[n]))
+            )
+        )
+        for n in range(blocks)
+    ]
+    return contacts.static_force / blocks * np.array(forces)
+
+
+def residual_of(tree: Tree, realization: int | None = None) -> float:
+    """Mean force on the contacts after ruptures over the static force; NaN without ruptures."""
+    config, data = config_of(tree), group_of(tree, "ruptures")
+    after = np.asarray(data["force_after"].values)
+    if realization is not None:
+        after = after[np.asarray(data["realization_index"].values) == realization]
+    if not after.size:
+        return float("nan")
+    return float(after.mean() * config.slider.block_count / config.contacts.static_force)
+
+
+def fronts(output: OutputLike) -> xr.DataTree:
+    """The fronts of detachment of an interface with a length, and the events that they are in.
+
+    Ruptures of neighbouring blocks whose slips overlap are one event: a precursor, or whole if it
+    reaches both ends. A front is an arm of an event, from a nucleation to where it stops.
+
+    Parameters
+    ----------
+    output
+        Output of a run with ``slider.kind = "interface"``.
+
+    Returns
+    -------
+    xarray.DataTree
+        Group ``fronts``, dimension ``front``: the columns of that group of the output, and
+        ``speed_ratio``, the size of the speed over that of sound. Group ``events``, dimension
+        ``event_row``: ``kind`` (0 precursor, 1 whole), ``length`` and ``block_count`` that
+        detached, the ``spring_force`` before, ``force_drop``, and the mean stress over strength
+        before. SI. Attribute ``sound_velocity`` [m/s].
+
+    Raises
+    ------
+    FileError
+        If the output cannot be read, or is not of such a slider.
+    """
+    import xarray as xr
+
+    with opened_run_arrays(output) as tree:
+        found = fronts_of(tree)
+    result = xr.DataTree.from_dict(dict(_datasets(found)))
+    result.attrs |= {"sound_velocity": found.sound_velocity, "blocks": found.blocks}
+    return result
+
+
+def _datasets(found: Fronts) -> Iterator[tuple[str, xr.Dataset]]:
+    import xarray as xr
+
+    for group, meanings, dimension, columns in (
+        ("fronts", ALL_FRONTS, "front", found.fronts),
+        ("events", EVENTS, "event_row", found.events),
+    ):
+        variables = {
+            name: meanings.variable(name, (dimension,), columns[name]) for name in meanings
+        }
+        yield group, xr.Dataset(variables)
+
+
+def fronts_from(tree: xr.DataTree) -> Fronts:
+    """The fronts that `fronts` returned."""
+    columns = [
+        {str(name): one.values for name, one in tree[group].data_vars.items()}
+        for group in ("fronts", "events")
+    ]
+    return Fronts(columns[0], columns[1], tree.attrs["sound_velocity"], tree.attrs["blocks"])

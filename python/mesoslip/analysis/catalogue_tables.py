@@ -64,6 +64,6 @@ def write_table(data: xr.Dataset | xr.DataTree, file: PathLike) -> None:
             avalanches.write_csv(data, path)
     else:
         raise FileError(
-            f"{path}: is for what mesoslip.slips, avalanches, response, strokes, plateaus or fronts "
-            "returns"
+            f"{path}: is for what mesoslip.slips, avalanches, response, strokes, plateaus or "
+            "fronts returns"
         )

@@ -230,9 +230,16 @@ def test_uniform_motion_breaks_ageing_contacts_where_clocks_do(ageing, ratio, de
     )
 
 
-@pytest.mark.parametrize("ageing", [None, {"law": "log", "time": 1.0, "growth": 0.1}])
-@pytest.mark.parametrize("width", [0.0, 0.25])
-def test_uniform_motion_does_not_depend_on_segments(width, ageing):
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        {"contacts__newborn_width": 0.25},
+        {"contacts__ageing": {"law": "log", "time": 1.0, "growth": 0.1}},
+    ],
+    ids=["one force", "newborn width", "ageing"],
+)
+def test_uniform_motion_does_not_depend_on_segments(changes):
     """The bits of a run in segments of one advance are those of a run in one piece."""
     config = unit(
         200,
@@ -241,8 +248,7 @@ def test_uniform_motion_does_not_depend_on_segments(width, ageing):
         contacts__thermal={"rate": 1.0, "force_ratio": 1.0},
         contacts__delay=0.1,
         contacts__back_force_ratio=0.1,
-        contacts__newborn_width=width,
-        contacts__ageing=ageing,
+        **changes,
     )
     origins = []
     for advances in (1, 100_000):

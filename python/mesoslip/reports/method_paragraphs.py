@@ -351,7 +351,7 @@ def _load(load: Load, key: str, config: Config) -> str:  # noqa: ARG001
     reference = quantity(load.normal_force, "N")
     if not load.varies:
         return (
-            f"They are {load.max_force / load.normal_force:g} times as many, under the normal "
+            f"Contacts are {load.max_force / load.normal_force:g} times as many, under the normal "
             f"force {quantity(load.max_force, 'N')}, N under {reference}."
         )
     within = f"between {quantity(load.min_force, 'N')} and {quantity(load.max_force, 'N')}"

@@ -13,6 +13,7 @@ import xarray as xr
 from conftest import long
 from mesoslip.analysis.strokes import (
     find_slips_between_reversals,
+    found_period,
     friction_map,
     monotone_pieces,
     pieces_of_force,
@@ -426,3 +427,18 @@ def test_the_motion_is_that_of_every_command(tmp_path) -> None:  # type: ignore[
     np.savetxt(path, np.c_[time, 3 + rng.random(1000)], delimiter=",", header=header, comments="")
     with pytest.raises(mesoslip.ConfigError, match="no reversals that stand out"):
         mesoslip.read_trace(path, motion="strokes")
+
+
+def test_the_period_of_revolutions_is_found() -> None:
+    """A force that repeats itself with harmonics and noise; noise alone does not."""
+    rng = np.random.default_rng(1)
+    time = np.arange(0, 60, 0.01)
+    phase = math.tau * time / 0.9234
+    force = 5 + 0.02 * time + 0.1 * np.sin(phase) + 0.2 * np.sin(2 * phase + 1)
+    force += 0.1 * rng.standard_normal(time.size)
+    assert found_period(time, force) == pytest.approx(0.9234, rel=1e-3)
+    assert found_period(time, rng.standard_normal(time.size)) is None
+    found = strokes_of(record_tree(time, force), period="auto")
+    assert found.notes[0].startswith("guess: a revolution takes 923")
+    with pytest.raises(mesoslip.FileError, match="does not repeat"):
+        mesoslip.strokes(record_tree(time, rng.standard_normal(time.size)), period="auto")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -34,7 +34,9 @@ def strokes(
     ] = "80%",
     period: Annotated[
         str | None,
-        typer.Option(help="Time of a revolution of a disc, such as '0.92 s'", metavar="TIME"),
+        typer.Option(
+            help="Time of a revolution of a disc, such as '0.92 s', or auto", metavar="TIME"
+        ),
     ] = None,
 ) -> None:
     """Print strokes and cycles of a record that goes back and forth, or revolutions of a disc."""
@@ -43,7 +45,9 @@ def strokes(
     from mesoslip.output.table_files import latex
 
     part = share(middle, "--middle")
-    time = quantity_or_none(period, "--period", "s", "0.92 s", positive=True)
+    time: float | Literal["auto"] | None = "auto"
+    if period != "auto":
+        time = quantity_or_none(period, "--period", "s", "0.92 s", positive=True)
     if table is not None:
         targets.check_writable(table, [output])
     with files.opened_arrays(output) as tree:

@@ -9,7 +9,7 @@ from mesoslip.analysis.strokes.catalogue import (
     strokes_of,
 )
 from mesoslip.analysis.strokes.friction_map import FrictionMap, along, friction_map, place_of
-from mesoslip.analysis.strokes.revolutions import has_rotation
+from mesoslip.analysis.strokes.revolutions import found_period, has_rotation
 from mesoslip.analysis.strokes.segments import (
     Piece,
     back_and_forth,
@@ -30,6 +30,7 @@ __all__ = [
     "back_and_forth",
     "check_middle",
     "find_slips_between_reversals",
+    "found_period",
     "friction_map",
     "has_rotation",
     "monotone_pieces",

@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,15 +17,15 @@ from mesoslip.analysis.printed_columns import printed_columns
 from mesoslip.analysis.strokes.cycles import Cycle, Overall, cycles_of, overall
 from mesoslip.analysis.strokes.measure import MIDDLE, Measured, Stroke, measure_all
 from mesoslip.analysis.strokes.record import StrokeRecord, record_of
-from mesoslip.analysis.strokes.revolutions import has_rotation, revolutions_of
+from mesoslip.analysis.strokes.revolutions import found_period, has_rotation, revolutions_of
 from mesoslip.analysis.strokes.variables import CYCLES, STROKES, unit_of
 from mesoslip.errors import ConfigError, FileError, Problem
 from mesoslip.output.arrays import Tree
 from mesoslip.output.inputs import OutputLike, opened_run_arrays
 from mesoslip.output.table_files import PrintedTable
 from mesoslip.output.targets import written_whole
-from mesoslip.output.variables import Group
-from mesoslip.quantities import with_error
+from mesoslip.output.variables import FORCES, Group
+from mesoslip.quantities import with_error, with_unit
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -163,12 +163,23 @@ def strokes_of(
     middle: float = MIDDLE,
     name: str = "the output",
     realization: int | None = None,
-    period: float | None = None,
+    period: float | Literal["auto"] | None = None,
 ) -> Strokes:
     """The strokes of all realizations of an output, or of one.
 
     They are revolutions, if those of a disc are recorded or their period [s] is given.
     """
+    guess = ""
+    if period == "auto":
+        root = tree.to_dataset()
+        force = root[next(one for one in FORCES if one in root)].values[realization or 0]
+        known = np.isfinite(force)
+        period = found_period(root["time"].values[known], force[known])
+        if period is None:
+            raise FileError(f"{name}: the force does not repeat itself; give a period")
+        guess = (
+            f"guess: a revolution takes {with_unit(period, 's', 5)}, after which the force repeats"
+        )
     unit = apparatus_of(tree, name).force_unit
     chosen = range(tree.sizes.get("realization", 1)) if realization is None else [realization]
     records, found, cycles = [], [], []
@@ -191,7 +202,7 @@ def strokes_of(
         middle,
         unit,
         records[0].source,
-        tuple(_notes(records[0], found)),
+        (*([guess] if guess else []), *_notes(records[0], found)),
         records,
         found,
     )
@@ -244,7 +255,7 @@ def strokes_from(tree: xr.DataTree) -> Strokes:
 
 
 def strokes(
-    output: OutputLike, *, middle: float = MIDDLE, period: float | None = None
+    output: OutputLike, *, middle: float = MIDDLE, period: float | Literal["auto"] | None = None
 ) -> xr.DataTree:
     """The strokes of a record that goes back and forth, or the revolutions of a disc.
 
@@ -259,7 +270,8 @@ def strokes(
         where no displacement is known. If the reversal reaches into the middle, it is left out as a
         transient.
     period
-        Time of a revolution of a disc [s]; by default, revolutions are those of a recorded column
+        Time of a revolution of a disc [s], or "auto": the time after which the force repeats
+        itself. By default, revolutions are those of a recorded column
         of revolutions or of their speed. A row has whole revolutions with at least 20 samples.
 
     Returns
@@ -284,7 +296,7 @@ def strokes(
     import xarray as xr
 
     check_middle("middle", middle)
-    if period is not None and not 0 < period < math.inf:
+    if period not in {None, "auto"} and not 0 < float(period or 0) < math.inf:
         raise ConfigError([Problem("", "period", "must be a time above 0", period)])
     with opened_run_arrays(output) as tree:
         found = strokes_of(tree, middle, period=period)

@@ -22,6 +22,8 @@ from mesoslip.quantities import with_unit
 
 Array = NDArray[np.float64]
 
+# Minimum correlation of a revolution with the next ones.
+MIN_CORRELATION = 0.3
 # Minimum number of samples of a row.
 MIN_SAMPLES = 20
 COUNT, SPEED = "revolutions", "rotation_speed"
@@ -68,6 +70,43 @@ def revolutions_of(
     record = record_in(tree, realization, pieces, source, noun, tuple(remarks))
     rows = [_row(record, one) for one in pieces[1:-1] if one.size > 1]
     return record, rows, [_as_cycle(one) for one in rows]
+
+
+def found_period(time: Array, force: Array) -> float | None:
+    """Period of a force that repeats itself [s], from its autocorrelation; None if it does not.
+
+    The correlation is that of the force without its trend, at the first lag after it has become
+    negative at which it is within a tenth of its maximum, for three periods or more.
+    """
+    from scipy.signal import correlate, detrend, find_peaks
+
+    count = max(time.size, 2)
+    interval = float(time[-1] - time[0]) / (count - 1)
+    even = detrend(np.interp(time[0] + interval * np.arange(count), time, force))
+    # Lags up to a third of the record, each over the samples that it has.
+    lags = np.arange(count // 3)
+    if lags.size < 2 * MIN_SAMPLES or not even.any():
+        return None
+    sums = correlate(even, even, method="fft")[count - 1 :][: lags.size]
+    correlation = sums / (count - lags)
+    correlation /= correlation[0]
+    below = np.flatnonzero(correlation < 0)
+    if not below.size:
+        return None
+    start = int(below[0])
+    peaks = find_peaks(correlation[start:])[0] + start
+    if not peaks.size or correlation[peaks].max() < MIN_CORRELATION:
+        return None
+    first = int(peaks[correlation[peaks] > 0.9 * correlation[peaks].max()][0])
+    # The last multiple of it has the smallest relative error.
+    times = lags.size // first - 1
+    last = max(1, times) * first
+    near = slice(max(first, last - first // 4), last + first // 4 + 1)
+    last = near.start + int(np.argmax(correlation[near]))
+    left, middle, right = correlation[last - 1 : last + 2] if last + 1 < lags.size else (0, 1, 0)
+    bend = left - 2 * middle + right
+    shift = 0.5 * (left - right) / bend if bend < 0 else 0.0
+    return (last + shift) * interval / max(1, times)
 
 
 def _angle(tree: Tree, realization: int, time: Array, period: float | None) -> tuple[Array, str]:

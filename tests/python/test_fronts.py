@@ -12,6 +12,9 @@ import pytest
 from kinds import configuration
 from mesoslip import Config, ConfigError, FileError
 from mesoslip.analysis.fronts import EVENTS, fronts_of, static_balance
+from mesoslip.command_line.main import app
+from mesoslip.plots.draw import movie_of
+from mesoslip.plots.views.base import Options
 from mesoslip.simulation.fronts import (
     ARRESTS,
     CLOSED_AFTER,
@@ -220,6 +223,51 @@ def test_the_function_and_its_tables_agree(tree, tmp_path):
     assert len(rows) == found.fronts["event"].size + 2 + found.events["event"].size
     answer = json.loads(json.dumps(found.to_json()))
     assert sum(one["events"] for one in answer["statistics"].values()) == len(answer["events"])
+
+
+@pytest.mark.parametrize("view", ["fronts", "precursors", "front-speeds", "interface-stress"])
+def test_views_of_an_interface_are_drawn(tree, view):
+    figure = mesoslip.plot(tree, view=view, realization=1)
+    (axes, *_) = figure.axes
+    low, high = axes.get_ylim()
+    drawn = [
+        (line, line.get_ydata())
+        for line in axes.lines
+        if line.get_label()[0] != "_" and len(line.get_ydata())
+    ]
+    assert drawn
+    for line, values in drawn:
+        inside = np.mean((np.asarray(values) >= low) & (np.asarray(values) <= high))
+        assert inside > 0.5, line.get_label()
+
+
+def test_the_precursors_drawn_are_the_events(tree):
+    figure = mesoslip.plot(tree, view="precursors")
+    lines = {line.get_label(): line for line in figure.axes[0].lines}
+    events = fronts_of(tree).events
+    for label, kind in (("precursors", 0), ("whole events", 1)):
+        assert len(lines[label].get_xdata()) == int(np.sum(events["kind"] == kind))
+
+
+def test_a_movie_shows_an_event(tree):
+    movie = movie_of(tree, "fronts", Options())
+    assert movie.count > 5
+    shown = []
+    for number in (0, movie.count - 1):
+        movie.show(number)
+        shown.append(np.array(movie.figure.axes[0].lines[0].get_ydata()))
+    assert np.any(shown[0] != shown[1])
+
+
+def test_the_command_prints_all_tables(tree, tmp_path, capsys):
+    tree.to_netcdf(tmp_path / "row.nc")
+    for arguments, text in (
+        ((), "Medians of first passages"),
+        (("--latex",), r"\toprule"),
+        (("--json",), '"stress_ratio_before_75"'),
+    ):
+        app(["fronts", str(tmp_path / "row.nc"), *arguments], standalone_mode=False)
+        assert text in capsys.readouterr().out
 
 
 def test_other_outputs_have_no_fronts():

@@ -82,7 +82,7 @@ def test_responses_and_avalanches(run, tmp_path, command):
     mesoslip.write_table(found, tmp_path / "python.tex")
     assert "Steady sliding" in (tmp_path / "python.tex").read_text()
     with pytest.raises(
-        mesoslip.FileError, match=r"what mesoslip[.]slips, avalanches, response or strokes"
+        mesoslip.FileError, match=r"what mesoslip[.]slips, avalanches, response, strokes, plateaus"
     ):
         mesoslip.write_table(mesoslip.derived(run), tmp_path / "python.md")
     status, _, error = command("slips", run, "--table", run)

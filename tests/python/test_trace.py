@@ -259,7 +259,7 @@ def test_rates_and_columns(tmp_path):
 @pytest.mark.parametrize(
     ("text", "options", "said"),
     [
-        (SINE.replace("force [uN]", "load [uN]"), [], "no column of the force"),
+        (SINE.replace("force [uN]", "channel [uN]"), [], "no column of the force"),
         (SINE.replace("force [uN]", "force [uM]"), [], "unit 'uM'"),
         (SINE.replace("force [uN]", "force"), [], "has no unit"),
         (SINE.replace("time [s]", "clock"), [], "--rate"),
@@ -318,8 +318,10 @@ def test_a_cell_that_counts_the_other_way(tmp_path, klein, command):
     printed = command("trace", table, "-o", tmp_path / "flat.nc")[2]
     assert "no slips stand out of the noise" in printed
     assert "inf" not in printed
-    with pytest.raises(mesoslip.FileError, match="has a column of the time, and a sampling rate"):
-        mesoslip.read_trace(table, rate=100.0)
+    # A rate beside times thins them, here to no fewer.
+    tree = mesoslip.read_trace(table, rate=100.0)
+    assert tree.sizes["time"] == 100
+    assert "not thinned: recorded at 1 Hz" in tree.attrs["understood"]
 
 
 # Rows of which the numbers can be read in two ways, or are written otherwise than with 0 to 9.

@@ -276,17 +276,15 @@ contains
       real(wp), intent(in) :: stretch(:)
       real(wp), intent(inout) :: limit(:)
 
+      real(wp) :: configured, key, attempts
       integer :: event
 
       do event = 1, size(contact)
-         associate (next => self%next(:, contact(event)))
-            next(next_configured) = limit(event)
-            next(next_limit) = limit(event)
-            call self%solve_newborn(contact(event), later, self%direction * stretch(event), &
-               & self%life(life_next, contact(event)), next(next_limit), next(next_key), &
-               & next(next_attempts))
-            limit(event) = min(next(next_limit), next(next_key))
-         end associate
+         configured = limit(event)
+         call self%solve_newborn(contact(event), later, self%direction * stretch(event), &
+            & self%life(life_next, contact(event)), limit(event), key, attempts)
+         self%next(:, contact(event)) = [limit(event), key, configured, attempts]
+         limit(event) = min(limit(event), key)
       end do
    end subroutine list_next
 

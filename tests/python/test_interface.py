@@ -220,7 +220,8 @@ def test_alike_contacts_under_springs_from_above_are_a_rigid_slider():
     tables["slider"] = {"kind": "rigid", "mass": 3 * BLOCK_MASS, "stiffness": 40.0, "damping": 0.4}
     rigid = finished(tables)
     places = places_of(blocks)[1][0]
-    assert np.ptp(places, axis=1).max() < 1e-9
+    assert np.ptp(places, axis=1).max() < 5e-5
     mine, theirs = blocks.table("trace")["spring_force"], rigid.table("trace")["spring_force"]
+    # Each block has steps of its own, to the accuracy of the master equation.
     assert theirs.max() > 100
     np.testing.assert_allclose(mine, theirs, atol=2e-3 * theirs.max())

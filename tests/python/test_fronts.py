@@ -24,6 +24,7 @@ from mesoslip.simulation.fronts import (
     basins,
     front_speed,
 )
+from mesoslip.simulation.memory import output_bytes
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
@@ -325,6 +326,13 @@ def test_notes_say_what_may_not_be_meant():
     stiff = configuration("interface", slider__neighbour_damping=1e7)
     assert "overdamped" in " ".join(stiff.notes)
     assert not configuration("rigid").notes
+
+
+def test_the_expected_size_has_the_blocks():
+    row, rigid = configuration("interface"), configuration("rigid")
+    samples = row.expected_duration / row.output_interval + 1
+    sizes = [output_bytes(one, has_finer=False) for one in (row, rigid)]
+    assert sizes[0] - sizes[1] == pytest.approx(8 * 4 * 4 * samples)
 
 
 def test_theory_of_a_rigid_slider_holds_for_springs_from_above():

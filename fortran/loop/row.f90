@@ -13,8 +13,9 @@ module mesoslip_loop_row
 
    public :: advance_row, start_row
 
-   !> Displacement that is rounding, over the breaking stretch of a contact
-   real(wp), parameter :: tiny_stretch = 4.0e-14_wp
+   !> Displacement that is rounding, over the breaking stretch of a contact, and over that of a
+   !> block by its static force under all its springs, if contacts are much softer than these
+   real(wp), parameter :: tiny_stretch = 4.0e-14_wp, tiny_bend = 4.0e-12_wp
 
 contains
 
@@ -25,11 +26,15 @@ contains
       class(row_slider_type), intent(inout) :: slider
       class(contact_row_type), intent(inout) :: contacts
 
+      real(wp) :: springs
       integer :: block
 
       associate (parameters => contacts%parameters)
-         slider%tiny_displacement = tiny_stretch * parameters%static_force / parameters%stiffness
          slider%pinned_stiffness = parameters%stiffness * (parameters%count / slider%blocks)
+         springs = slider%pinned_stiffness + 2.0_wp * slider%neighbour_spring &
+            & + slider%edge_stiffness + slider%top_stiffness / slider%blocks
+         slider%tiny_displacement = parameters%static_force / parameters%stiffness &
+            & * min(tiny_stretch, tiny_bend * slider%pinned_stiffness / springs)
       end associate
       slider%has_clocks = contacts%has_clocks
       do block = 1, slider%blocks

@@ -25,10 +25,10 @@ contains
          stiffness = max(stiffness, abs(self%block(block)%law%stiffness))
          drag = max(drag, self%block(block)%law%drag)
       end do
-      rate = 2.0_wp * maxval(self%neighbours) * self%bond + maxval(self%pull) &
+      rate = 2.0_wp * self%most_neighbours * self%bond + maxval(self%pull) &
          & + stiffness * self%inverse_mass
       rate = sqrt(rate) + drag * self%inverse_mass + self%damping &
-         & + 2.0_wp * maxval(self%neighbours) * self%viscosity
+         & + 2.0_wp * self%most_neighbours * self%viscosity
    end function fastest_rate
 
    !> Coefficients of the drive's displacement since a moment of the step.

@@ -78,8 +78,10 @@ module mesoslip_sliders_interface_state
       !> Spring and damping between neighbours, spring to the drive, over the mass of a block
       real(wp) :: bond = 0.0_wp, viscosity = 0.0_wp
       real(wp), allocatable :: pull(:)
-      !> Number of neighbours of each block
+      !> Number of neighbours of each block, and of a block inside. Blocks whose neighbours move alike
+      !> have the same steps at the ends of the row: the contacts are told the latter
       real(wp), allocatable :: neighbours(:)
+      real(wp) :: most_neighbours = 0.0_wp
       !> Published motion of each block and its damper's, shape (blocks, 0:max_order), and its order
       real(wp), allocatable :: published(:, :), published_damper(:, :)
       integer :: order = min_order
@@ -159,6 +161,7 @@ contains
          self%neighbours = 2.0_wp
          self%neighbours(1) = self%neighbours(1) - 1.0_wp
          self%neighbours(n) = self%neighbours(n) - 1.0_wp
+         self%most_neighbours = maxval(self%neighbours)
          self%bond = self%neighbour_spring / block_mass
          self%viscosity = self%neighbour_damping
          self%pull = self%top_stiffness / self%mass
@@ -247,7 +250,7 @@ contains
 
       pose = pose_type(self%base_time + self%moment(block), self%place(block), self%speed(block), &
          & 2.0_wp * self%bend(block), self%sense(block), self%inverse_mass, &
-         & sqrt(self%neighbours(block) * self%bond + self%pull(block)), .false.)
+         & sqrt(self%most_neighbours * self%bond + self%pull(block)), .false.)
    end function block_pose
 
    !> Force of a block on its contacts [N].

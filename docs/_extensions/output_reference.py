@@ -67,6 +67,22 @@ GROUPS: tuple[tuple[str, Group, str], ...] = (
         variables.SLIP_TRACES,
         "Dimension `sample`: the trace at `output.slip_interval` during slips.",
     ),
+    (
+        "Group blocks",
+        variables.BLOCKS,
+        "Dimensions `realization`, `time`, `block`: the blocks of an "
+        "[interface with a length](../../interface.md) at the samples of the trace.",
+    ),
+    (
+        "Group ruptures",
+        variables.RUPTURES,
+        "Dimension `rupture`: slips of blocks in which half of the pinned contacts broke.",
+    ),
+    (
+        "Group fronts",
+        variables.FRONTS,
+        "Dimension `front`: fronts that detached an interface, from where they began on.",
+    ),
     ("Group energy", variables.ENERGY, "Dimension `realization`: the terms of the energy balance."),
     ("Group avalanches", variables.AVALANCHES, "Dimension `avalanche`."),
     (

@@ -66,10 +66,10 @@ LATTICE = {"strength": 0.3, "columns": 60, "rows": 68}
         (
             "slider",
             {"kind": "quasistatic", "stiffness": 97.0, "mass": 1.0},
-            ["slider.mass", 'is for slider.kind = "rigid" or "layered" or "force" only'],
+            ["slider.mass", '"rigid" or "layered" or "force" or "interface" only'],
         ),
         ("slider", LAYERED | {"layers": 0}, ["slider.layers", "greater than or equal to 1"]),
-        ("slider", LAYERED | {"damping_ratio": 0.2}, ["slider.damping_ratio", '"rigid" only']),
+        ("slider", LAYERED | {"damping_ratio": 0.2}, ["slider.damping_ratio", '"rigid" or "interface" only']),
         ("slider", LAYERED | {"base": {"mass": 1.0}}, ["slider.base.stiffness", "missing"]),
         (
             "slider",
@@ -1033,7 +1033,8 @@ def test_a_kind_of_slider_is_named_once():
     for table in SLIDER_KINDS:
         kind = table.model_fields["kind"].default
         assert SLIDERS[kind] is table
-        keys = {"kind": kind} | dict.fromkeys(("mass", "stiffness", "layers"), 1)
+        numbers = ("mass", "stiffness", "layers", "blocks", "length", "bar_stiffness")
+        keys = {"kind": kind} | dict.fromkeys(numbers, 1)
         keys = {key: value for key, value in keys.items() if key in table.model_fields}
         drive = {"force": 1e-6} if table.takes_forces else {"velocity": 1e-7}
         assert type(Config.from_dict(klein_tables(slider=keys, drive=drive)).slider) is table

@@ -347,7 +347,7 @@ def test_the_caption_has_the_keys_that_a_run_changes(runs):
         ({"start": 1.0, "end": 0.5}, "1 s is not before 0.5 s"),
         ({"realization": 0.5}, "realization = 0.5: must be a whole number"),
         ({"snapshot": "1"}, "snapshot = '1': must be a whole number"),
-        ({"x": ["time"]}, "x = .*: unknown; choose from time"),
+        ({"x": ["time"]}, r"x = \['time'\]: must be a text"),
         ({"figure": 3.5}, "figure = 3.5: must be a figure of matplotlib"),
         ({"ax": "left"}, "ax = 'left': must be axes of matplotlib"),
     ],

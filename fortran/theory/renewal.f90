@@ -49,10 +49,13 @@ contains
       real(wp) :: weight(points), system(points, points), rates(3)
       integer :: first, last, panel, lag, i, kinds, kind, stat
 
-      allocate (solution%point(points), solution%breaks(points, panels), &
-         & solution%slope(points, panels), solution%force(points, panels), &
-         & solution%stiffness(points, panels), solution%pinned(panels + 1), &
-         & released(points, panels, 3), stat=stat)
+      allocate (solution%point(points), stat=stat)
+      if (stat == 0) allocate (solution%breaks(points, panels), stat=stat)
+      if (stat == 0) allocate (solution%slope(points, panels), stat=stat)
+      if (stat == 0) allocate (solution%force(points, panels), stat=stat)
+      if (stat == 0) allocate (solution%stiffness(points, panels), stat=stat)
+      if (stat == 0) allocate (solution%pinned(panels + 1), stat=stat)
+      if (stat == 0) allocate (released(points, panels, 3), stat=stat)
       if (stat /= 0) then
          call raise(error, status_memory, no_memory)
          return

@@ -69,7 +69,11 @@ LATTICE = {"strength": 0.3, "columns": 60, "rows": 68}
             ["slider.mass", '"rigid" or "layered" or "force" or "interface" only'],
         ),
         ("slider", LAYERED | {"layers": 0}, ["slider.layers", "greater than or equal to 1"]),
-        ("slider", LAYERED | {"damping_ratio": 0.2}, ["slider.damping_ratio", '"rigid" or "interface" only']),
+        (
+            "slider",
+            LAYERED | {"damping_ratio": 0.2},
+            ["slider.damping_ratio", '"rigid" or "interface" only'],
+        ),
         ("slider", LAYERED | {"base": {"mass": 1.0}}, ["slider.base.stiffness", "missing"]),
         (
             "slider",

@@ -96,8 +96,10 @@ contains
 
       integer :: stat
 
-      allocate (self%held(bins), self%pending_held(bins), self%fresh_held(bins), &
-         & self%mix(bins, size(self%packet, 2)), source=0.0_wp, stat=stat)
+      allocate (self%held(bins), source=0.0_wp, stat=stat)
+      if (stat == 0) allocate (self%pending_held(bins), source=0.0_wp, stat=stat)
+      if (stat == 0) allocate (self%fresh_held(bins), source=0.0_wp, stat=stat)
+      if (stat == 0) allocate (self%mix(bins, size(self%packet, 2)), source=0.0_wp, stat=stat)
       if (stat /= 0) then
          call raise(error, status_memory, "not enough memory for the detached contacts")
       end if

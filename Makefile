@@ -178,7 +178,8 @@ $(WHEEL): $(WHEEL_TOOLS) $(SOURCES)
 # Without link-time optimization, which each test would repeat; Python tests run it.
 build/release/build.ninja: PROFILE := --buildtype=release
 # With checks the tests take half the time if they are optimized a little.
-build/debug/build.ninja: PROFILE := --buildtype=debug -Doptimization=1 -Dchecks=true
+# The checks name file and line themselves; without debugging symbols the build takes a quarter less.
+build/debug/build.ninja: PROFILE := --buildtype=debug -Doptimization=1 -Ddebug=false -Dchecks=true
 build/sanitize/build.ninja: PROFILE := --buildtype=debug -Db_sanitize=address,undefined \
   -Db_lundef=false
 build/%/build.ninja: Makefile | $(ENVIRONMENT)

@@ -37,7 +37,11 @@ def test_steady_force_is_that_of_the_theory(threshold, ageing, ratio, velocity):
 
 
 @pytest.mark.parametrize(
-    "ageing", [{"law": "log", "time": 1e-4, "growth": 0.03}, RELAX], ids=["log", "relax"]
+    "ageing",
+    [
+        pytest.param({"law": "log", "time": 1e-4, "growth": 0.03}, id="log"),
+        pytest.param(RELAX, id="relax", marks=pytest.mark.long),
+    ],
 )
 def test_many_contacts_come_to_the_populations(ageing):
     """With slips, a hold and a reversal."""

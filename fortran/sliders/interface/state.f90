@@ -78,8 +78,8 @@ module mesoslip_sliders_interface_state
       !> Spring and damping between neighbours, spring to the drive, over the mass of a block
       real(wp) :: bond = 0.0_wp, viscosity = 0.0_wp
       real(wp), allocatable :: pull(:)
-      !> Number of neighbours of each block, and of a block inside. Blocks whose neighbours move alike
-      !> have the same steps at the ends of the row: the contacts are told the latter
+      !> Number of neighbours of each block, and of one inside, of which all contacts are told: so
+      !> blocks that move alike have the same steps at the ends of the row
       real(wp), allocatable :: neighbours(:)
       real(wp) :: most_neighbours = 0.0_wp
       !> Published motion of each block and its damper's, shape (blocks, 0:max_order), and its order

@@ -92,7 +92,7 @@ module mesoslip_contacts_base
       real(wp) :: cost = 1.0_wp
       !> Length of a schedule that is used up before the normal load ends it, about
       integer :: schedule_length = max_events
-      !> Whether what is offered depends on the state alone, and holds until the next response
+      !> Whether an offer depends on the state alone, and holds until the next response
       logical :: keeps_offers = .false.
       !> Clocks of thermally activated breaking, which the slider advances; whether there are any
       type(hazard_clock_type) :: clock(clocks)

@@ -3,9 +3,10 @@ module mesoslip_loop_row
    use mesoslip_contacts_row, only: contact_row_type
    use mesoslip_interface_law, only: interface_law_type, pose_type, window_type
    use mesoslip_loop_endings, only: ending_none
-   use mesoslip_loop_state, only: state_type
+   use mesoslip_loop_state, only: max_idle_advances, no_progress, state_type
    use mesoslip_loop_transitions, only: change_drive, end_at_displacement, end_at_slips, &
       & end_if_steady
+   use mesoslip_numerics_errors, only: raise, status_invalid, status_stalled
    use mesoslip_numerics_kinds, only: i8, wp
    use mesoslip_sliders_interface_row, only: row_slider_type
    implicit none
@@ -29,6 +30,10 @@ contains
       real(wp) :: springs
       integer :: block
 
+      if (size(contacts%block) /= slider%blocks) then
+         call raise(contacts%failure, status_invalid, "contacts of another number of blocks")
+         return
+      end if
       associate (parameters => contacts%parameters)
          slider%pinned_stiffness = parameters%stiffness * (parameters%count / slider%blocks)
          springs = slider%pinned_stiffness + 2.0_wp * slider%neighbour_spring &
@@ -62,7 +67,8 @@ contains
       class(contact_row_type), intent(inout) :: contacts
 
       type(pose_type) :: pose
-      integer :: block
+      real(wp) :: last_time
+      integer :: block, idle
       logical :: asks
 
       slider%has_clocks = contacts%has_clocks
@@ -72,6 +78,8 @@ contains
          end do
       end if
       call slider%begin_step(next_stop(state, slider))
+      idle = 0
+      last_time = slider%time
       do
          block = slider%next_event()
          if (block == 0) exit
@@ -83,6 +91,12 @@ contains
             if (allocated(contacts%failure)) return
          end if
          call slider%renew(block)
+         idle = merge(0, idle + 1, pose%time > last_time)
+         last_time = max(last_time, pose%time)
+         if (idle > max_idle_advances) then
+            call raise(contacts%failure, status_stalled, no_progress)
+            return
+         end if
       end do
       call slider%end_step()
       state%advances = state%advances + 1_i8

@@ -8,7 +8,7 @@ module mesoslip_loop_simulation
    use mesoslip_loop_row, only: advance_row, start_row
    use mesoslip_loop_scheduled, only: advance_through_schedule
    use mesoslip_loop_segment, only: new_segment, segment_type
-   use mesoslip_loop_state, only: state_type
+   use mesoslip_loop_state, only: max_idle_advances, no_progress, state_type
    use mesoslip_loop_transitions, only: look_for_steady, shift_origin, take_next_part
    use mesoslip_numerics_errors, only: error_type, raise, status_invalid, status_stalled
    use mesoslip_numerics_kinds, only: i8, wp
@@ -20,8 +20,6 @@ module mesoslip_loop_simulation
 
    public :: simulation_type
 
-   !> Maximum number of advances in a row that change neither time nor displacement
-   integer, parameter :: max_idle_advances = 1000000
    !> Share of the time of a part of the drive that is no progress for all of them together
    real(wp), parameter :: tiny_part = 1.0e-20_wp
    !> Time at which nothing happens
@@ -199,9 +197,7 @@ contains
          end if
       end associate
       self%idle = self%idle + int(min(max(1_i8, advances), int(max_idle_advances, i8)))
-      if (self%idle > max_idle_advances) call raise(error, status_stalled, "the motion makes " &
-         & // "no progress: very many steps change neither time nor displacement, as where " &
-         & // "contacts break and attach again without end")
+      if (self%idle > max_idle_advances) call raise(error, status_stalled, no_progress)
    end subroutine check_progress
 
 end module mesoslip_loop_simulation

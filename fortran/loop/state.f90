@@ -17,7 +17,7 @@ module mesoslip_loop_state
    implicit none
    private
 
-   public :: state_type
+   public :: state_type, max_idle_advances, no_progress
    public :: energy_columns, energy_length, table_names
 
    !> Terms of the energy balance: work of the drive; energy of the slider and its spring; of the
@@ -28,6 +28,11 @@ module mesoslip_loop_state
       & "drive_work", "slider_energy", "contact_energy", "damping_loss", "drag_loss", &
       & "break_loss", "birth_gain", "step_work", "separation_loss", "gross_work", "residual"]
    integer, parameter :: energy_length = size(energy_columns)
+   !> Maximum number of advances in a row that change neither time nor displacement, and the message
+   integer, parameter :: max_idle_advances = 1000000
+   character(len=*), parameter :: no_progress = "the motion makes no progress: very many steps " &
+      & // "change neither time nor displacement, as where contacts break and attach again " &
+      & // "without end"
    !> Names of the tables
    character(len=*), parameter :: table_names(*) = [character(len=name_length) :: "trace", &
       & "slip_trace", "slips", "stages", "layers", "blocks", "ruptures", "avalanches", &

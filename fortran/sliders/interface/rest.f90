@@ -86,6 +86,7 @@ contains
       self%published(:, 0) = place
       self%published(:, 1) = speed
       self%published(:, 2) = 0.0_wp
+      self%published_damper(:, :1) = 0.0_wp
    end subroutine try_rest
 
 end module mesoslip_sliders_interface_rest

@@ -2,11 +2,11 @@
 !>
 !> A step of the row is so short that the motion of each block in it is a polynomial, exact to
 !> rounding, if no contact breaks or attaches: the published motion, which its neighbours feel.
-!> A block whose contacts change continues from there on a motion of its own. What it has done
-!> since to its neighbours, beyond the published motion, grows with the fourth power of time: it is
-!> integrated, and given to them before it exceeds rounding. They continue from there on motions of
-!> their own in turn. So an event costs the work of one block and seldom of two or four more,
-!> however long the row.
+!> A block whose contacts change continues on a motion of its own. The displacement of its
+!> neighbours by the excess over the published motion grows with the fourth power of time: it is
+!> integrated, and added to theirs before it exceeds rounding. Then they continue on motions of
+!> their own, too. So an event costs the work of one block and seldom of two or four more, however
+!> long the row.
 module mesoslip_sliders_interface_row
    use mesoslip_interface_law, only: clocks, hazard_clock_type, interface_law_type, pose_type, &
       & window_type
@@ -15,7 +15,8 @@ module mesoslip_sliders_interface_row
    use mesoslip_sliders_interface_losses, only: add_losses, add_published_losses
    use mesoslip_sliders_interface_polynomials, only: bound, evaluate, integrals, max_order, move
    use mesoslip_sliders_interface_rest, only: try_rest
-   use mesoslip_sliders_interface_series, only: drive_at, expand, expand_all, fastest_rate
+   use mesoslip_sliders_interface_series, only: drive_at, expand, expand_all, fastest_rate, &
+      & shorten_step
    use mesoslip_sliders_interface_state, only: busy_pace, load_motion, min_order, &
       & motion_of_damper, quiet_pace, row_state_type
    use mesoslip_sliders_motion_series, only: first_end, inverse
@@ -64,9 +65,9 @@ contains
       self%length = end_time - self%time
       self%reaches_end = .true.
       self%rests = .false.
+      self%rate = fastest_rate(self)
       if (self%is_quiet) call try_rest(self)
       if (.not. self%rests) then
-         self%rate = fastest_rate(self)
          if (self%length * self%rate > self%pace) then
             self%length = self%pace / self%rate
             self%reaches_end = .false.
@@ -230,7 +231,7 @@ contains
          continue
       end select
       pose = self%block_pose(block)
-      ! Nor may rounding keep it before the end of its window.
+      ! Rounding must not leave it just before the end of its window.
       if (self%block(block)%window%end_time - self%base_time <= self%moment(block) &
          & * (1.0_wp + 4.0_wp * epsilon(1.0_wp))) then
          pose%time = max(pose%time, self%block(block)%window%end_time)
@@ -365,6 +366,7 @@ contains
 
       integer :: neighbour
 
+      call shorten_step(self, block)
       if (self%block(block)%kind == event_publish) then
          call publish(self, block)
          do neighbour = block - 1, block + 1, 2

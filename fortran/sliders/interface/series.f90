@@ -7,7 +7,7 @@ module mesoslip_sliders_interface_series
    implicit none
    private
 
-   public :: drive_at, expand, expand_all, fastest_rate
+   public :: drive_at, expand, expand_all, fastest_rate, shorten_step
 
 contains
 
@@ -16,20 +16,41 @@ contains
       class(row_state_type), intent(in) :: self
       real(wp) :: rate
 
-      real(wp) :: stiffness, drag
-      integer :: block
-
-      stiffness = self%pinned_stiffness
-      drag = 0.0_wp
-      do block = 1, self%blocks
-         stiffness = max(stiffness, abs(self%block(block)%law%stiffness))
-         drag = max(drag, self%block(block)%law%drag)
-      end do
-      rate = 2.0_wp * self%most_neighbours * self%bond + maxval(self%pull) &
-         & + stiffness * self%inverse_mass
-      rate = sqrt(rate) + drag * self%inverse_mass + self%damping &
-         & + 2.0_wp * self%most_neighbours * self%viscosity
+      rate = rate_of(self, maxval(abs(self%block%law%stiffness)), maxval(self%block%law%drag))
    end function fastest_rate
+
+   !> Bound on the rates of a row whose blocks have contacts of a stiffness [N/m] and a drag [N s/m]
+   !> at most.
+   pure function rate_of(self, stiffness, drag) result(rate)
+      class(row_state_type), intent(in) :: self
+      real(wp), intent(in) :: stiffness, drag
+      real(wp) :: rate
+
+      rate = 2.0_wp * self%max_neighbours * self%bond + maxval(self%pull) &
+         & + max(stiffness, self%pinned_stiffness) * self%inverse_mass
+      rate = sqrt(rate) + drag * self%inverse_mass + self%damping &
+         & + 2.0_wp * self%max_neighbours * self%viscosity
+   end function rate_of
+
+   !> End the step earlier if the contacts of a block have become so stiff or dragging that motions
+   !> would not be exact up to its end, as where all of a block detach and their drag is large.
+   subroutine shorten_step(self, block)
+      class(row_state_type), intent(inout) :: self
+      !> The block, at the time of the row's last event
+      integer, intent(in) :: block
+
+      real(wp) :: rate, length
+
+      associate (law => self%block(block)%law)
+         rate = rate_of(self, abs(law%stiffness), law%drag)
+      end associate
+      if (rate <= self%rate) return
+      self%rate = rate
+      length = self%moment(block) + self%reach(self%order) / rate
+      if (length >= self%length) return
+      self%length = length
+      self%reaches_end = .false.
+   end subroutine shorten_step
 
    !> Coefficients of the drive's displacement since a moment of the step.
    pure function drive_at(self, moment) result(drive)

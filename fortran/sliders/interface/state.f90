@@ -78,10 +78,10 @@ module mesoslip_sliders_interface_state
       !> Spring and damping between neighbours, spring to the drive, over the mass of a block
       real(wp) :: bond = 0.0_wp, viscosity = 0.0_wp
       real(wp), allocatable :: pull(:)
-      !> Number of neighbours of each block, and of one inside, of which all contacts are told: so
-      !> blocks that move alike have the same steps at the ends of the row
+      !> Number of neighbours of each block; of one inside the row, which the poses of all blocks
+      !> have, so that the contacts of blocks that move alike take the same steps
       real(wp), allocatable :: neighbours(:)
-      real(wp) :: most_neighbours = 0.0_wp
+      real(wp) :: max_neighbours = 0.0_wp
       !> Published motion of each block and its damper's, shape (blocks, 0:max_order), and its order
       real(wp), allocatable :: published(:, :), published_damper(:, :)
       integer :: order = min_order
@@ -161,7 +161,7 @@ contains
          self%neighbours = 2.0_wp
          self%neighbours(1) = self%neighbours(1) - 1.0_wp
          self%neighbours(n) = self%neighbours(n) - 1.0_wp
-         self%most_neighbours = maxval(self%neighbours)
+         self%max_neighbours = maxval(self%neighbours)
          self%bond = self%neighbour_spring / block_mass
          self%viscosity = self%neighbour_damping
          self%pull = self%top_stiffness / self%mass
@@ -250,7 +250,7 @@ contains
 
       pose = pose_type(self%base_time + self%moment(block), self%place(block), self%speed(block), &
          & 2.0_wp * self%bend(block), self%sense(block), self%inverse_mass, &
-         & sqrt(self%most_neighbours * self%bond + self%pull(block)), .false.)
+         & sqrt(self%max_neighbours * self%bond + self%pull(block)), .false.)
    end function block_pose
 
    !> Force of a block on its contacts [N].

@@ -2,12 +2,56 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple
+
 import xarray as xr
 
 from mesoslip.analysis import avalanches, fronts, plateaus, response, slips, strokes
 from mesoslip.configuration.reading import PathLike, as_path
 from mesoslip.errors import FileError
-from mesoslip.output.table_files import is_printed, write_printed
+from mesoslip.output.table_files import PrintedTable, is_printed, write_printed
+
+
+class _Writers(NamedTuple):
+    """The tables of a catalogue for print, and its file of comma-separated values."""
+
+    tables: Callable[[], Sequence[PrintedTable]]
+    write_csv: Callable[[Path], None]
+
+
+def _own(make: Callable[[Any], Any], data: Any) -> _Writers:
+    """Those of a catalogue that has them itself."""
+    found = make(data)
+    return _Writers(lambda: found.tables, found.write_csv)
+
+
+def _of_response(data: Any) -> _Writers:
+    return _Writers(partial(response.tables, data), partial(response.write_csv, data))
+
+
+def _of_slips(data: Any) -> _Writers:
+    catalogue = slips.catalogue_from(data)
+    return _Writers(lambda: [catalogue.printed()], catalogue.write_csv)
+
+
+def _of_avalanches(data: Any) -> _Writers:
+    return _Writers(lambda: [avalanches.printed(data)], partial(avalanches.write_csv, data))
+
+
+# By a group or a dimension that only these data have.
+BY_GROUP: dict[str, Callable[[Any], _Writers]] = {
+    "steady": _of_response,
+    "cycles": partial(_own, strokes.strokes_from),
+    "fronts": partial(_own, fronts.fronts_from),
+}
+BY_DIMENSION: dict[str, Callable[[Any], _Writers]] = {
+    "plateau": partial(_own, plateaus.plateaus_from),
+    "slip": _of_slips,
+    "avalanche": _of_avalanches,
+}
 
 
 def write_table(data: xr.Dataset | xr.DataTree, file: PathLike) -> None:
@@ -27,43 +71,17 @@ def write_table(data: xr.Dataset | xr.DataTree, file: PathLike) -> None:
         If the data are of another kind, or the file cannot be written.
     """
     path = as_path(file)
-    for_print = is_printed(path)
-    if isinstance(data, xr.DataTree) and "steady" in data.children:
-        if for_print:
-            write_printed(response.tables(data), path)
-        else:
-            response.write_csv(data, path)
-    elif isinstance(data, xr.DataTree) and "cycles" in data.children:
-        found = strokes.strokes_from(data)
-        if for_print:
-            write_printed(found.tables, path)
-        else:
-            found.write_csv(path)
-    elif isinstance(data, xr.Dataset) and "plateau" in data.dims:
-        levels = plateaus.plateaus_from(data)
-        if for_print:
-            write_printed(levels.tables, path)
-        else:
-            levels.write_csv(path)
-    elif isinstance(data, xr.DataTree) and "fronts" in data.children:
-        catalogue_of_fronts = fronts.fronts_from(data)
-        if for_print:
-            write_printed(catalogue_of_fronts.tables, path)
-        else:
-            catalogue_of_fronts.write_csv(path)
-    elif isinstance(data, xr.Dataset) and "slip" in data.dims:
-        catalogue = slips.catalogue_from(data)
-        if for_print:
-            write_printed([catalogue.printed()], path)
-        else:
-            catalogue.write_csv(path)
-    elif isinstance(data, xr.Dataset) and "avalanche" in data.dims:
-        if for_print:
-            write_printed([avalanches.printed(data)], path)
-        else:
-            avalanches.write_csv(data, path)
-    else:
-        raise FileError(
-            f"{path}: is for what mesoslip.slips, avalanches, response, strokes, plateaus or "
-            "fronts returns"
-        )
+    known = BY_GROUP if isinstance(data, xr.DataTree) else BY_DIMENSION
+    names = data.children if isinstance(data, xr.DataTree) else getattr(data, "dims", ())
+    for name, writers_of in known.items():
+        if name in names:
+            writers = writers_of(data)
+            if is_printed(path):
+                write_printed(writers.tables(), path)
+            else:
+                writers.write_csv(path)
+            return
+    raise FileError(
+        f"{path}: is for what mesoslip.slips, avalanches, response, strokes, plateaus or fronts "
+        "returns"
+    )

@@ -212,7 +212,7 @@ def _open_streams() -> None:
 
 
 def _without_memory(spare: mmap | None) -> int:
-    """Report that there is no memory; what was kept for it is left to destructors."""
+    """Report that memory is short; the spare memory is freed first, for destructors."""
     if spare is not None:
         spare.close()
     typer.echo(NO_MEMORY, err=True)

@@ -73,7 +73,7 @@ class Strokes:
     source: str
     """The quantity in which strokes were found."""
     notes: Sequence[str]
-    """Sentences on what was found, with guesses."""
+    """Sentences on the strokes, and the guesses by which they were found."""
     records: Sequence[StrokeRecord] = ()
     strokes: Sequence[Sequence[Stroke]] = ()
     """Records and strokes by realization."""

@@ -16,7 +16,7 @@ module mesoslip_loop_row
 
    !> Displacement that is rounding, over the breaking stretch of a contact, and over that of a
    !> block by its static force under all its springs, if contacts are much softer than these
-   real(wp), parameter :: tiny_stretch = 4.0e-14_wp, tiny_bend = 4.0e-12_wp
+   real(wp), parameter :: tiny_stretch = 4.0e-15_wp, tiny_bend = 4.0e-13_wp
 
 contains
 
@@ -195,7 +195,8 @@ contains
             call state%ruptures%note_motion(block, slider%time, slider%drive%direction &
                & * (own%pose%velocity - drive_velocity), slider%origin + own%pose%displacement, &
                & slider%block_force(block), own%contacts%breaks, &
-               & contact_count - own%contacts%detached_count)
+               & contact_count - own%contacts%detached_count, &
+               & 1.0_wp - own%contacts%detached_count / contact_count)
          end associate
       end do
    end subroutine note_blocks

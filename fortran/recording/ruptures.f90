@@ -1,7 +1,9 @@
 !> The catalogue of ruptures: slips of the blocks of an interface in which most contacts break.
 !>
 !> A block slips while it is faster than the drive by the slip velocity, and until it has been
-!> slower for the quiet time. It ruptures if half of its contacts that were pinned at first break.
+!> slower for the quiet time. It ruptures when half of the contacts break that were pinned when it
+!> was slow and most of them were: in the slip, or before it, as contacts that break together do
+!> before the block gets fast.
 module mesoslip_recording_ruptures
    use mesoslip_numerics_archive, only: archive_type
    use mesoslip_numerics_errors, only: error_type, raise, status_memory
@@ -30,7 +32,7 @@ module mesoslip_recording_ruptures
       logical :: is_open = .false.
       !> When it began, when the block was fast last, and when it ruptured, or never [s]
       real(wp) :: start_time = 0.0_wp, last_time = 0.0_wp, rupture_time = never
-      !> Force [N], displacement [m] and breaks at the start, breaks at which it ruptures
+      !> Force [N], displacement [m] and breaks before it, breaks at which the block ruptures
       real(wp) :: start_force = 0.0_wp, start_place = 0.0_wp, start_breaks = 0.0_wp, limit = never
       !> Force [N] and displacement [m] when it was fast last, and maximum of its velocity [m/s]
       real(wp) :: last_force = 0.0_wp, last_place = 0.0_wp, peak_velocity = 0.0_wp
@@ -93,28 +95,32 @@ contains
    end subroutine note_breaks
 
    !> A block moves: its slip begins, continues or ends.
-   subroutine note_motion(self, block, time, excess, place, force, breaks, pinned)
+   subroutine note_motion(self, block, time, excess, place, force, breaks, pinned, pinned_part)
       class(rupture_recorder_type), intent(inout) :: self
       integer, intent(in) :: block
       !> Time [s], velocity above the drive's along its direction [m/s], displacement [m]
       real(wp), intent(in) :: time, excess, place
-      !> Force on the contacts [N], breaks so far, and contacts that are pinned
-      real(wp), intent(in) :: force, breaks, pinned
+      !> Force on the contacts [N], breaks so far, contacts that are pinned, and part of all contacts
+      real(wp), intent(in) :: force, breaks, pinned, pinned_part
 
       associate (slip => self%slip(block))
          if (excess > self%slip_velocity) then
             if (.not. slip%is_open) then
-               slip = block_slip_type(is_open=.true., start_time=time, start_force=force, &
-                  & start_place=place, start_breaks=breaks, &
-                  & limit=breaks + max(1.0_wp, broken_part * pinned))
+               slip%is_open = .true.
+               slip%start_time = min(time, slip%rupture_time)
             end if
             slip%last_time = time
             slip%last_force = force
             slip%last_place = place
             slip%peak_velocity = max(slip%peak_velocity, excess)
-         else if (slip%is_open .and. time > slip%last_time + self%quiet_time) then
+            return
+         end if
+         if (slip%is_open .and. time > slip%last_time + self%quiet_time) then
             call self%close_slip(block, breaks)
          end if
+         if (slip%is_open .or. pinned_part < broken_part) return
+         slip = block_slip_type(start_force=force, start_place=place, start_breaks=breaks, &
+            & limit=breaks + max(1.0_wp, broken_part * pinned))
       end associate
    end subroutine note_motion
 
@@ -125,12 +131,13 @@ contains
       real(wp), intent(in) :: breaks
 
       associate (slip => self%slip(block))
-         slip%is_open = .false.
-         slip%limit = never
-         if (.not. slip%rupture_time < never) return
-         call self%catalogue%add([real(block, wp), slip%start_time, slip%rupture_time, &
-            & slip%last_time, slip%start_force, slip%last_force, &
-            & slip%last_place - slip%start_place, slip%peak_velocity, breaks - slip%start_breaks])
+         if (slip%rupture_time < never) then
+            call self%catalogue%add([real(block, wp), slip%start_time, slip%rupture_time, &
+               & slip%last_time, slip%start_force, slip%last_force, &
+               & slip%last_place - slip%start_place, slip%peak_velocity, &
+               & breaks - slip%start_breaks])
+         end if
+         slip = block_slip_type()
       end associate
    end subroutine close_slip
 

@@ -135,6 +135,12 @@ def test_basins_cover_a_row_once_and_start_at_its_minima(seed):
     assert len(basins(times, 2.0)) == 1
 
 
+@pytest.mark.parametrize(("right", "last"), [(2.0, 2), (0.6, 1)])
+def test_the_last_block_between_two_fronts_belongs_to_the_one_that_came_first(right, last):
+    left, other = basins(np.array([0.0, 1.0, 3.0, right, 0.5]), 0.1)
+    assert (left.nucleus, left.last, other.first, other.nucleus) == (0, last, last + 1, 4)
+
+
 def test_the_speed_is_that_of_most_blocks():
     positions = np.arange(20) * SPACING
     times = positions / 30

@@ -211,6 +211,44 @@ def test_one_block_is_the_rigid_slider(loading):
     np.testing.assert_allclose(one.slips[:, :2], rigid.slips[:, :2], rtol=1e-4)
 
 
+def test_many_contacts_of_a_block_balance_the_energy():
+    """Several break before its neighbours have to know of it."""
+    tables = row(6, 8.0, damping=0.4)
+    tables["contacts"] |= {"count": 6 * 500, "threshold": {"law": "uniform", "relative_width": 0.1}}
+    one = finished(tables)
+    assert one.breaks > 2000
+    assert abs(one.energy_residual) < 1e-12
+
+
+def test_a_rupture_is_the_break_of_half_of_the_pinned_contacts():
+    """Also if all have broken before the block is fast: the force is that before."""
+    tables = row(1, 4.0, bar_stiffness=None)
+    tables["contacts"] |= {"delay": 10.0, "drag": 0.0}
+    tables["contacts"]["threshold"]["relative_width"] = 0.001
+    one = finished(tables)
+    (rupture,) = one.table("ruptures")
+    assert one.breaks == OF_BLOCK
+    assert rupture["breaks"] >= OF_BLOCK - 2
+    assert rupture["force_before"] == pytest.approx(CONTACT_STIFFNESS, rel=0.25)
+    assert rupture["start_time"] <= rupture["rupture_time"] <= rupture["end_time"]
+
+
+def test_a_rupture_is_at_the_break_of_half_of_the_contacts_pinned_before_it():
+    """Without attachment, the contacts that are detached count the breaks."""
+    tables = row(1, 6.0, bar_stiffness=None, damping=6.0, stiffness=10.0)
+    tables["contacts"] |= {"delay": 10.0, "drag": 0.0}
+    tables["contacts"]["threshold"]["relative_width"] = 0.5
+    tables["output"]["interval"] = 1e-3
+    one = finished(tables)
+    (rupture,) = one.table("ruptures")
+    trace = one.table("trace")
+    pinned = rupture["breaks"]
+    assert pinned >= OF_BLOCK / 2
+    detached = OF_BLOCK - pinned / 2
+    first = trace["time"][np.flatnonzero(trace["detached_contacts"] >= detached)[0]]
+    assert first - 1e-3 <= rupture["rupture_time"] <= first
+
+
 @pytest.mark.parametrize("drag", [300.0, 3e4])
 def test_blocks_that_detach_into_a_large_drag_move_exactly(drag):
     """The fastest rate grows within a step, far beyond that at its start."""

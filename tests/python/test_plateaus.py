@@ -104,6 +104,17 @@ def test_errors_know_correlation():
         assert 0.5 < np.mean(np.square(ratios)) < 2.0
 
 
+def test_a_load_that_varies_is_no_error_of_the_coefficient():
+    """Friction follows it; the error of the coefficient is that of the rest."""
+    time, speed, _, _ = record()
+    rng = np.random.default_rng(4)
+    load = LOAD * (1 + 0.05 * rng.standard_normal(time.size))
+    force = 0.1 * load * (1 + 1e-4 * rng.standard_normal(time.size))
+    found = plateaus_of(tree_of(time, force, load, speed)).columns
+    assert found["mean_friction_coefficient"] == pytest.approx(np.full(SPEEDS.size, 0.1), rel=1e-4)
+    assert np.all(found["mean_friction_coefficient_error"] < 5e-6)
+
+
 def tree_of(time, force, load=None, speed=None):
     """A measured output of arrays."""
     import xarray as xr

@@ -259,12 +259,14 @@ BLOCKS = Group(
 RUPTURES = Group(
     realization_index=REALIZATION_INDEX,
     block_number=Meaning("1", "number of the block, 1 at the edge", np.int64),
-    start_time=Meaning("s", "time at which the block became faster than the slip velocity"),
+    start_time=Meaning(
+        "s", "time at which the block got faster than the slip velocity, or ruptured before"
+    ),
     rupture_time=Meaning(
-        "s", "time at which half of the contacts that were pinned at the start had broken"
+        "s", "time at which half of the contacts that were pinned before the slip had broken"
     ),
     end_time=Meaning("s", "last time at which the block was faster than the slip velocity"),
-    force_before=Meaning("N", "force of the block on its contacts at the start"),
+    force_before=Meaning("N", "force of the block on its contacts just before the slip"),
     force_after=Meaning("N", "force of the block on its contacts at the end"),
     slip=Meaning("m", "displacement of the block in its slip"),
     peak_velocity=Meaning("m s-1", "maximum velocity of the block relative to the drive"),
@@ -291,7 +293,7 @@ FRONTS = Group(
     ),
     arrest=_flags("where the front ended", " ".join(fronts.ARRESTS)),
     stress_ratio_before=Meaning(
-        "1", "force on the contacts at the start of the slips of its blocks over their static force"
+        "1", "force on the contacts just before the slips of its blocks over their static force"
     ),
 )
 

@@ -100,7 +100,7 @@ contains
       integer, intent(in) :: block
       !> Time [s], velocity above the drive's along its direction [m/s], displacement [m]
       real(wp), intent(in) :: time, excess, place
-      !> Force on the contacts [N], breaks so far, contacts that are pinned, and part of all contacts
+      !> Force on the contacts [N], breaks so far, pinned contacts, and their part of all contacts
       real(wp), intent(in) :: force, breaks, pinned, pinned_part
 
       associate (slip => self%slip(block))

@@ -8,8 +8,9 @@ from __future__ import annotations
 import math
 import threading
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import takewhile
 from typing import Any, Self
 
 import numpy as np
@@ -18,7 +19,7 @@ from mesoslip.configuration import arguments
 from mesoslip.configuration.config import Config
 from mesoslip.errors import RunError
 from mesoslip.simulation.fronts import FrontFinder
-from mesoslip.simulation.kernel import Array, Kernel, Words
+from mesoslip.simulation.kernel import Array, Completed, Kernel, Progress, Words
 from mesoslip.simulation.kernel_setup import KernelSetup, tables_of
 from mesoslip.simulation.memory import check_memory
 from mesoslip.simulation.recorded_tables import (
@@ -142,6 +143,22 @@ class Realization(Recorded):
         Steps, evaluations and failed steps of the slider's integrator, if it has one.
     """
 
+    # A run may have 10⁵ of them.
+    __slots__ = (
+        *("config", "number", *SAVED_ATTRIBUTES, "integrator_counts", "_parameters", "_coarse"),
+        *(
+            "_lacks_errors",
+            "_has_steps",
+            "_is_discrete",
+            "_after",
+            "_start",
+            "_energy",
+            "_recorded",
+            "_fronts",
+        ),
+        *("_setup", "_kernel", "_words", "_work", "_lock"),
+    )
+
     @arguments.checked(
         config=arguments.instance(Config, "a Config"),
         number=arguments.whole(0),
@@ -180,6 +197,7 @@ class Realization(Recorded):
         self._lacks_errors = False
         longer = contacts.coarse_parameters(config, coarsening)
         self._has_steps = longer is not None
+        self._is_discrete = contacts.is_discrete
         if longer is not None:
             self._parameters = longer
             self._lacks_errors = estimates_errors and after is None
@@ -208,8 +226,13 @@ class Realization(Recorded):
     def _sibling(self, number: int) -> Realization:
         """Another realization, of which neither has started."""
         other = object.__new__(type(self))
-        other.__dict__.update(self.__dict__, number=number, _tables={}, _lock=threading.Lock())
-        other._fronts = front_finder(self.config)
+        for name in Realization.__slots__:
+            setattr(other, name, getattr(self, name))
+        other.number = number
+        other._tables = {}
+        other._lock = threading.Lock()
+        if self._fronts is not None:
+            other._fronts = front_finder(self.config)
         return other
 
     def _open(self) -> Kernel:
@@ -343,9 +366,15 @@ class Realization(Recorded):
 
     def _take(self, kernel: Kernel) -> None:
         """Take the recorded rows and the progress of the kernel."""
-        progress = self._start.progress_since(kernel.ask())
+        progress = kernel.ask()
+        energy = kernel.energy() if progress.ending else None
+        self._adopt(progress, energy, kernel.drain(*self._recorded))
+
+    def _adopt(self, progress: Progress, energy: Array | None, tables: dict[str, Array]) -> None:
+        """Take recorded rows, the progress, and at the end the terms of the energy balance."""
+        progress = self._start.progress_since(progress)
         with self._lock:
-            for table, rows in kernel.drain(*self._recorded).items():
+            for table, rows in tables.items():
                 values = self._start.rows_since(table, rows)
                 self._add(table, values)
                 if table == "ruptures" and self._fronts is not None:
@@ -353,7 +382,7 @@ class Realization(Recorded):
                     self._add("fronts", self._fronts.add(values, is_last=is_last))
             self.time = progress.time
             self.breaks = progress.breaks
-            if self.config.contact_kind.is_discrete:
+            if self._is_discrete:
                 self.breaks = int(progress.breaks)
             self.detached = progress.detached
             self.advances = progress.advances
@@ -362,14 +391,42 @@ class Realization(Recorded):
             self.displacement = progress.displacement
             if not self._has_steps:
                 self.force_error = progress.force_error
-            self.integrator_counts = progress.integrator_counts.copy()
+            self.integrator_counts = progress.integrator_counts
             self.ending = ENDINGS[progress.ending]
-            self._energy = self._start.energy_since(kernel.energy()) if self.ending else None
+            self._energy = None if energy is None else self._start.energy_since(energy)
+
+    @staticmethod
+    def run_together(realizations: Sequence[Realization]) -> int:
+        """Run realizations of `all_of`, each from start to end, in one call of the kernel, up to
+        one that has started, is long, records much or fails; returns how many have run."""
+        first = realizations[0]
+        realizations = list(takewhile(lambda one: one._is_new, realizations))
+        if not realizations or first._setup is None or first._lacks_errors or first._fronts:
+            return 0
+        start = time.perf_counter()
+        kernel = first._setup.open(first.number)
+        try:
+            completed: list[Completed] = kernel.run_realizations(
+                [one.number for one in realizations],
+                first.config.contacts.initial,
+                first._recorded,
+                SEGMENT_WORK,
+            )
+        finally:
+            kernel.close()
+        seconds = (time.perf_counter() - start) / max(1, len(completed))
+        for one, result in zip(realizations, completed, strict=False):
+            one._adopt(*result)
+            one.kernel_seconds = seconds
+        return len(completed)
 
     def _add(self, table: str, values: Array) -> None:
         """Add rows of a table."""
         if len(values):
-            self._tables.setdefault(table, Rows(values.shape[1])).add(values)
+            rows = self._tables.get(table)
+            if rows is None:
+                rows = self._tables[table] = Rows(values.shape[1])
+            rows.add(values)
 
     def close(self) -> None:
         """Free the memory of the kernel, when the run is not continued."""
@@ -379,6 +436,11 @@ class Realization(Recorded):
         if self._coarse is not None:
             self._coarse.close()
             self._coarse = None
+
+    @property
+    def _is_new(self) -> bool:
+        """Whether it has not started."""
+        return self._kernel is None and self._words is None and self.advances == 0
 
     @property
     def is_open(self) -> bool:

@@ -110,6 +110,8 @@ class Rows:
     The thread of the realization adds pieces; another one moves them into files.
     """
 
+    __slots__ = ("_count", "_lock", "columns", "pieces", "waiting_bytes")
+
     def __init__(self, columns: int) -> None:
         self.columns = columns
         self.pieces: list[Array | Stored] = []
@@ -214,6 +216,8 @@ class SnapshotRows:
 
 class Recorded:
     """Rows that a run has recorded, by table."""
+
+    __slots__ = ("_tables",)
 
     def __init__(self) -> None:
         self._tables: dict[str, Rows] = {}

@@ -529,7 +529,6 @@ class Realization(Recorded):
         scalars = {name: getattr(self, name) for name in SAVED_ATTRIBUTES} | {
             "integrator_counts": self.integrator_counts.tolist(),
             "energy": None if self._energy is None else self._energy.tolist(),
-            "columns": {table: rows.columns for table, rows in self._tables.items()},
         }
         if self._fronts is not None:
             scalars["fronts"] = self._fronts.save()

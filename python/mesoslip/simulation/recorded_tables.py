@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import os
 import threading
+import weakref
 import zlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -14,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip.errors import RunError, shown
-from mesoslip.execution.regular_files import open_regular
+from mesoslip.execution.regular_files import regular_descriptor
 from mesoslip.simulation.fronts import FRONT_COLUMNS
 from mesoslip.simulation.kernel import name_list
 
@@ -64,11 +66,37 @@ def structured(values: Array, columns: Sequence[str]) -> NDArray[np.void]:
     return np.ascontiguousarray(values).view(row)[:, 0]
 
 
+class RowFile:
+    """A file of rows, which stays open from the first reading on."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._number: int | None = None
+
+    def read(self, place: int, count: int) -> Array:
+        """Numbers from a place [bytes] on, fewer at the end of the file.
+
+        Raises a `RunError` if they cannot be read.
+        """
+        try:
+            if self._number is None:
+                self._number = regular_descriptor(self._path, os.O_RDONLY)
+                weakref.finalize(self, os.close, self._number)
+            values = np.empty(count)
+            length = os.preadv(self._number, [values.data.cast("B")], place)
+        except OSError as error:
+            raise RunError(f"{self._path}: cannot be read: {error.strerror}") from error
+        return values[: length // values.itemsize]
+
+    def __str__(self) -> str:
+        return str(self._path)
+
+
 @dataclass(slots=True)
 class Stored:
     """Rows in a file, from ``place`` [bytes] on."""
 
-    path: Path
+    file: RowFile
     place: int
     shape: tuple[int, int]
     checksum: int
@@ -83,22 +111,16 @@ class Stored:
 
     def load(self) -> Array:
         """Read them; raises a `RunError` if they differ from the written rows."""
-        try:
-            with open_regular(self.path, "rb") as file:
-                values = self._read(file)
-        except OSError as error:
-            raise RunError(f"{self.path}: cannot be read: {error.strerror}") from error
+        values = self.file.read(self.place, math.prod(self.shape))
         if not self._equals(values):
-            raise RunError(f"{self.path}: damaged: it differs from the rows that the run wrote")
+            raise RunError(f"{self.file}: damaged: it differs from the rows that the run wrote")
         return values.reshape(self.shape)
 
     def is_whole(self, file: IO[bytes]) -> bool:
         """Whether their file, which is open, has the written rows."""
-        return self._equals(self._read(file))
-
-    def _read(self, file: IO[bytes]) -> Array:
         file.seek(self.place)
-        return np.fromfile(file, dtype=np.float64, count=math.prod(self.shape))
+        values = np.fromfile(file, dtype=np.float64, count=math.prod(self.shape))
+        return self._equals(values)
 
     def _equals(self, values: Array) -> bool:
         return values.size == math.prod(self.shape) and zlib.crc32(values.data) == self.checksum

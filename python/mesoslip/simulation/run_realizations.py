@@ -132,8 +132,7 @@ class _Run:
     def _visit(self, realizations: Sequence[Realization]) -> None:
         """Keep realizations that came to their ends."""
         if self._checkpoint is not None:
-            for one in realizations:
-                self._checkpoint.visit(one)
+            self._checkpoint.visit(*realizations)
 
     def _advance(self, realization: Realization, stop: Stop) -> None:
         """Advance a realization to its end."""

@@ -147,8 +147,10 @@ def _pieces(results: Results, table: str, numbers: Iterable[int]) -> Iterator[tu
     """The rows of a table of some realizations in pieces, each with its realization."""
     max_rows = block_rows(results.config, table)
     for number in numbers:
-        for piece in results.realizations[number].rows(table).blocks(max_rows):
-            yield number, piece
+        rows = results.realizations[number].rows(table)
+        if len(rows):
+            for piece in rows.blocks(max_rows):
+                yield number, piece
 
 
 # Rows: their slice, pieces, and the realization of each piece.
@@ -162,6 +164,11 @@ def _cut(pieces: Iterable[tuple[int, Array]], max_rows: int) -> Iterator[Cut]:
     owners: list[int] = []
     for number, piece in pieces:
         remaining = piece
+        if count + len(piece) < max_rows:
+            parts.append(piece)
+            owners.append(number)
+            count += len(piece)
+            continue
         while len(remaining):
             part, remaining = remaining[: max_rows - count], remaining[max_rows - count :]
             parts.append(part)

@@ -33,8 +33,8 @@ from mesoslip.configuration.differences import by_dotted_key
 from mesoslip.errors import FileError
 from mesoslip.execution.store import Folder
 from mesoslip.simulation.realization import Realization, Saved
-from mesoslip.simulation.recorded_tables import TABLES, RowFile, Rows, Stored
-from mesoslip.simulation.saved_states import from_arrays, to_arrays
+from mesoslip.simulation.recorded_tables import MAX_SMALL_BYTES, TABLES, RowFile, Rows, Stored
+from mesoslip.simulation.saved_states import NUMBERS, from_arrays, to_arrays
 
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
@@ -259,26 +259,30 @@ class Checkpoint:
                     waiting.setdefault(table, []).append((one, rows))
         for table, all_rows in waiting.items():
             place = self._sizes[table]
-            appended: list[tuple[Rows, int, Stored]] = []
+            appended: list[tuple[Rows, list[Stored | None]]] = []
             found = array("q")
             with self._files.open(ROWS.format(table), "r+b" if place else "xb") as file:
                 store = RowFile(self.folder / ROWS.format(table))
                 file.seek(place)
                 for one, rows in all_rows:
-                    for number, values in rows.waiting():
-                        data = np.ascontiguousarray(values, dtype=np.float64)
+                    stored: list[Stored | None] = []
+                    for values in rows.waiting():
+                        data = np.ascontiguousarray(values)
                         length, columns = data.shape
                         checksum = zlib.crc32(data.data)
                         file.write(data.data)
-                        stored = Stored(store, place, (length, columns), checksum)
-                        appended.append((rows, number, stored))
+                        large = data.nbytes > MAX_SMALL_BYTES
+                        stored.append(
+                            Stored(store, place, (length, columns), checksum) if large else None
+                        )
                         found.extend((one.number, place, length, columns, checksum))
                         place += data.nbytes
+                    appended.append((rows, stored))
             # After an error of the disk none of them is in the file.
             self._sizes[table] = place
             self._pieces[table].extend(found)
-            for rows, number, stored in appended:
-                rows.store(number, stored)
+            for rows, stored in appended:
+                rows.store(stored)
 
     def _write(self, realizations: Sequence[Realization]) -> bool:
         self._last = time.perf_counter()
@@ -302,11 +306,10 @@ class Checkpoint:
                 with self._files.open(ROWS.format(table), "r+b") as file:
                     file.truncate(size)
                     os.fsync(file.fileno())
-        states = running | {number: one.save() for number, one in over.items()}
-        arrays: dict[str, Any] = to_arrays(states)
+        arrays: dict[str, Any] = to_arrays(running, over.values())
         for table in TABLES:
-            counts = {number: one.counts.get(table, 0) for number, one in states.items()}
-            arrays[f"pieces.{table}"] = _first_rows(self._pieces[table], counts)
+            counts = zip(arrays[NUMBERS].tolist(), arrays[f"counts.{table}"].tolist(), strict=True)
+            arrays[f"pieces.{table}"] = _first_rows(self._pieces[table], dict(counts))
         header = self._program | {
             "configuration": self._config.to_toml(),
             "wall_seconds": self._earlier_seconds + time.perf_counter() - self._start,

@@ -18,6 +18,7 @@ import numpy as np
 from mesoslip.configuration import arguments
 from mesoslip.configuration.config import Config
 from mesoslip.errors import RunError
+from mesoslip.simulation.audit import share_of_work
 from mesoslip.simulation.fronts import FrontFinder
 from mesoslip.simulation.kernel import Array, Completed, Kernel, Progress, Words
 from mesoslip.simulation.kernel_setup import KernelSetup, tables_of
@@ -43,9 +44,6 @@ ENDINGS = {
     "displacement": "displacement of the slider reached",
     "steady": "steady state reached",
 }
-
-# Minimum scale of energy residuals, over the energy of all contacts about to break.
-MIN_ENERGY_RATIO = 1e-9
 
 # Terms of the energy balance before the first advance.
 NO_ENERGY = np.full(len(ENERGY_COLUMNS), np.nan)
@@ -483,21 +481,13 @@ class Realization(Recorded):
     def energy_residual(self) -> float:
         """Residual of the energy balance, relative to the work of the drive, forth and back, or the
         largest term."""
-        return self._part_of_work(self.energy[-1])
+        return float(share_of_work(self.config, self.energy, "residual"))
 
     @property
     def step_work(self) -> float:
         """Work on the contact force in steps beyond that on the contacts, relative to the work of
         the drive; 0 where contacts are kept one by one."""
-        return self._part_of_work(self.energy[ENERGY_COLUMNS.index("step_work")])
-
-    def _part_of_work(self, term: float) -> float:
-        contacts, energy = self.config.contacts, self.energy
-        # The minimum scale is for runs in which hardly any work is done.
-        unit = contacts.static_force**2 / contacts.stiffness
-        # Cycles may return all of the work.
-        scale = energy[ENERGY_COLUMNS.index("gross_work")] or float(np.max(np.abs(energy)))
-        return float(term / max(scale, MIN_ENERGY_RATIO * unit))
+        return float(share_of_work(self.config, self.energy, "step_work"))
 
     @property
     def contacts(self) -> dict[str, Array]:
@@ -530,10 +520,19 @@ class Realization(Recorded):
             "integrator_counts": self.integrator_counts.tolist(),
             "energy": None if self._energy is None else self._energy.tolist(),
         }
-        if self._fronts is not None:
-            scalars["fronts"] = self._fronts.save()
-        counts = {table: len(rows) for table, rows in self._tables.items()}
-        return Saved(scalars, counts, words)
+        fronts = self.save_fronts()
+        if fronts is not None:
+            scalars["fronts"] = fronts
+        return Saved(scalars, self.counts, words)
+
+    def save_fronts(self) -> dict[str, Any] | None:
+        """What a checkpoint keeps of fronts that are not over; None for sliders without any."""
+        return None if self._fronts is None else self._fronts.save()
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Number of rows by table."""
+        return {table: len(rows) for table, rows in self._tables.items()}
 
     @arguments.checked(saved=arguments.instance(Saved, "what save returns"), tables=arguments.table)
     def restore(self, saved: Saved, tables: dict[str, Rows]) -> None:

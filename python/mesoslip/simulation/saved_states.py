@@ -3,39 +3,41 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mesoslip.simulation.realization import SAVED_ATTRIBUTES, Saved
+from mesoslip.simulation.realization import SAVED_ATTRIBUTES, Realization, Saved
 from mesoslip.simulation.recorded_tables import ENERGY_COLUMNS, TABLES
 
 Arrays = dict[str, NDArray[Any]]
 
 NUMBERS = "realizations"
-# Scalars of a state that are lists of numbers, and their lengths.
-LISTS = {"integrator_counts": 3, "energy": len(ENERGY_COLUMNS)}
+# Scalars of a state that are lists of numbers: their lengths and types.
+LISTS = {"integrator_counts": (3, np.int64), "energy": (len(ENERGY_COLUMNS), np.float64)}
 
 
-def to_arrays(states: Mapping[int, Saved]) -> Arrays:
-    """States by number of their realization as arrays by name."""
-    values = list(states.values())
-    arrays = {NUMBERS: np.array(list(states), dtype=np.int64)}
+def to_arrays(running: Mapping[int, Saved], over: Collection[Realization]) -> Arrays:
+    """States of realizations, and realizations that are over, as arrays by name."""
+    saved = running.values()
+    arrays = {NUMBERS: np.array([*running, *(one.number for one in over)], dtype=np.int64)}
     for name in SAVED_ATTRIBUTES:
-        arrays[f"scalars.{name}"] = np.array([one.scalars[name] for one in values])
-    for name, length in LISTS.items():
+        values = [one.scalars[name] for one in saved]
+        arrays[f"scalars.{name}"] = np.array([*values, *(getattr(one, name) for one in over)])
+    for name, (length, dtype) in LISTS.items():
         # The energy is not known before the end.
-        lists = [one.scalars[name] or [np.nan] * length for one in values]
-        arrays[f"scalars.{name}"] = np.array(lists).reshape(-1, length)
-    if values and "fronts" in values[0].scalars:
-        texts = [json.dumps(one.scalars["fronts"]) for one in values]
-        arrays["scalars.fronts"] = np.array(texts)
+        lists = [one.scalars[name] or [np.nan] * length for one in saved]
+        rows = [np.array(lists, dtype=dtype).ravel(), *(getattr(one, name) for one in over)]
+        arrays[f"scalars.{name}"] = np.concatenate(rows).reshape(-1, length)
+    counts = [*(one.counts for one in saved), *(one.counts for one in over)]
     for table in TABLES:
-        counts = [one.counts.get(table, 0) for one in values]
-        arrays[f"counts.{table}"] = np.array(counts, dtype=np.int64)
-    for number, one in states.items():
+        arrays[f"counts.{table}"] = np.array([one.get(table, 0) for one in counts], dtype=np.int64)
+    fronts = [one.scalars.get("fronts") for one in saved] + [one.save_fronts() for one in over]
+    if any(fronts):
+        arrays["scalars.fronts"] = np.array([json.dumps(one) for one in fronts])
+    for number, one in running.items():
         if one.words is not None:
             arrays[f"words.{number}"] = one.words
     return arrays

@@ -6,6 +6,7 @@ module mesoslip_boundary_handles
    use, intrinsic :: iso_c_binding, only: c_f_pointer, c_intptr_t, c_loc, c_null_ptr, c_ptr
    use mesoslip_numerics_errors, only: error_type, raise, status_invalid, status_ok
    use mesoslip_numerics_kinds, only: i8
+   use mesoslip_numerics_parameters, only: name_length, parameters_type
    use mesoslip_loop_simulation, only: simulation_type
    implicit none
    private
@@ -13,17 +14,27 @@ module mesoslip_boundary_handles
    !> Characters of a message at the boundary
    integer, parameter :: message_length = 200
 
-   public :: open_handle, close_handle, find_simulation, report
+   public :: open_handle, close_handle, find_simulation, find_recipe, report
+   public :: recipe_type
    ! For the procedures that Python calls.
    public :: error_type, simulation_type
 
    !> Stamp of every simulation, besides its address
    integer(i8), parameter :: stamp = int(z'6D65736F736C6970', i8)
 
+   !> What contacts and slider of a simulation were made of: kinds, parameters, key of the random
+   !> numbers; blank before.
+   type :: recipe_type
+      character(len=name_length) :: contacts = "", slider = ""
+      type(parameters_type) :: contact_parameters, slider_parameters
+      integer(i8) :: seed = 0_i8
+   end type recipe_type
+
    !> A simulation with its stamp.
    type :: stamped_type
       integer(i8) :: stamp = 0_i8
       type(simulation_type) :: simulation
+      type(recipe_type) :: recipe
    end type stamped_type
 
 contains
@@ -79,6 +90,18 @@ contains
       if (.not. simulation%is_whole()) call raise(error, status_invalid, &
          & "the simulation lacks contacts, a slider, a drive, or what is to be recorded")
    end subroutine find_simulation
+
+   !> What a simulation was made of; null if it was closed.
+   subroutine find_recipe(handle, recipe)
+      integer(i8), intent(in) :: handle(2)
+      type(recipe_type), pointer, intent(out) :: recipe
+
+      type(stamped_type), pointer :: stamped
+
+      recipe => null()
+      call find(handle, stamped)
+      if (associated(stamped)) recipe => stamped%recipe
+   end subroutine find_recipe
 
    !> The simulation of a handle; null if it was closed.
    subroutine find(handle, stamped)

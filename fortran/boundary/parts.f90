@@ -5,7 +5,8 @@ subroutine set_contacts(handle, kind, length, names, values, words, seed, realiz
    & message)
    !f2py threadsafe
    use mesoslip_contacts, only: make_contacts
-   use mesoslip_boundary_handles, only: error_type, find_simulation, report, simulation_type
+   use mesoslip_boundary_handles, only: error_type, find_recipe, find_simulation, recipe_type, &
+      & report, simulation_type
    use mesoslip_numerics_parameters, only: new_parameters, parameters_type
    implicit none
    integer(8), intent(in) :: handle(2)
@@ -20,12 +21,17 @@ subroutine set_contacts(handle, kind, length, names, values, words, seed, realiz
    character(len=200), intent(out) :: message
 
    type(simulation_type), pointer :: simulation
+   type(recipe_type), pointer :: recipe
    type(parameters_type) :: parameters
    type(error_type), allocatable :: error
 
    call find_simulation(handle, .false., simulation, error)
    if (.not. allocated(error)) then
       call new_parameters(parameters, names, values, words)
+      call find_recipe(handle, recipe)
+      recipe%contacts = kind
+      recipe%contact_parameters = parameters
+      recipe%seed = seed
       call make_contacts(simulation%contacts, kind, parameters, seed, realization, error)
    end if
    call report(error, status, message)
@@ -66,7 +72,8 @@ end subroutine copy_contacts
 !> Give a simulation its slider.
 subroutine set_slider(handle, kind, length, names, values, words, status, message)
    !f2py threadsafe
-   use mesoslip_boundary_handles, only: error_type, find_simulation, report, simulation_type
+   use mesoslip_boundary_handles, only: error_type, find_recipe, find_simulation, recipe_type, &
+      & report, simulation_type
    use mesoslip_numerics_parameters, only: new_parameters, parameters_type
    use mesoslip_sliders, only: make_slider
    implicit none
@@ -80,12 +87,16 @@ subroutine set_slider(handle, kind, length, names, values, words, status, messag
    character(len=200), intent(out) :: message
 
    type(simulation_type), pointer :: simulation
+   type(recipe_type), pointer :: recipe
    type(parameters_type) :: parameters
    type(error_type), allocatable :: error
 
    call find_simulation(handle, .false., simulation, error)
    if (.not. allocated(error)) then
       call new_parameters(parameters, names, values, words)
+      call find_recipe(handle, recipe)
+      recipe%slider = kind
+      recipe%slider_parameters = parameters
       call make_slider(simulation%slider, kind, parameters, error)
    end if
    call report(error, status, message)

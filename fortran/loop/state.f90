@@ -73,6 +73,7 @@ module mesoslip_loop_state
       type(archive_type), private :: kept
    contains
       procedure, non_overridable :: is_whole
+      procedure, non_overridable :: take_settings
       procedure, non_overridable :: energy_balance
       procedure, non_overridable :: table
       procedure, non_overridable :: rows_to_drain
@@ -98,6 +99,21 @@ contains
          & .and. allocated(self%avalanches%catalogue%row) .and. allocated(self%stages%rows%row)
       if (is_whole) is_whole = self%slider%drive%is_open() .and. self%steady%is_open()
    end function is_whole
+
+   !> Take what another state, which is not started, has beside its contacts and its slider.
+   subroutine take_settings(self, other)
+      class(state_type), intent(inout) :: self
+      class(state_type), intent(in) :: other
+
+      self%slider%drive = other%slider%drive
+      self%recorder = other%recorder
+      self%avalanches = other%avalanches
+      self%ruptures = other%ruptures
+      self%stages = other%stages
+      self%steady = other%steady
+      self%stop = other%stop
+      self%max_schedule = other%max_schedule
+   end subroutine take_settings
 
    !> Terms of the energy balance, in the order of energy_columns [J].
    function energy_balance(self) result(energy)

@@ -28,7 +28,7 @@ module mesoslip_recording_avalanches
    integer, parameter :: snapshot_event_length = size(snapshot_event_columns)
 
    !> Initial room for avalanches
-   integer, parameter :: initial_room = 1000
+   integer, parameter :: initial_room = 64
    !> Numbers of avalanches, and of numbers in snapshots, at which the run pauses so that they are
    !> drained
    integer, parameter :: pausing_avalanches = 100000, pausing_numbers = 6000000

@@ -7,8 +7,7 @@ module mesoslip_recording_slip_trace
    use mesoslip_numerics_kinds, only: i8, wp
    use mesoslip_numerics_parameters, only: name_length
    use mesoslip_recording_buffer, only: buffer_type
-   use mesoslip_recording_trace, only: max_samples_in_step, pausing_samples, sample_of, &
-      & trace_columns
+   use mesoslip_recording_trace, only: initial_room, sample_of, trace_columns
    use mesoslip_sliders_base, only: slider_type
    implicit none
    private
@@ -63,7 +62,7 @@ contains
       real(wp), intent(in) :: interval
 
       self%interval = interval
-      call self%rows%open(slip_trace_length, pausing_samples + max_samples_in_step)
+      call self%rows%open(slip_trace_length, initial_room)
    end subroutine open
 
    !> Number of samples that can be drained: not those of a fall that may not become a slip.

@@ -42,6 +42,8 @@ module mesoslip_recording_slips
    integer, parameter :: slip_length = size(slip_columns)
    !> Number of slips at which the run pauses so that they are drained
    integer, parameter :: pausing_slips = 2000
+   !> Initial room for slips
+   integer, parameter :: initial_room = 16
 
    !> Minimum fall of the force in a slip, over the force regained by ringing
    real(wp), parameter :: min_fall_ratio = 2.0_wp
@@ -112,7 +114,7 @@ contains
       type(slip_parameters_type), intent(in) :: parameters
 
       self%parameters = parameters
-      call self%catalogue%open(slip_length, pausing_slips)
+      call self%catalogue%open(slip_length, initial_room)
       call self%trace%open(parameters%interval)
       call self%minima%open()
    end subroutine open

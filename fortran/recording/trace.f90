@@ -11,7 +11,7 @@ module mesoslip_recording_trace
    private
 
    public :: trace_type, sample_of, trace_columns, trace_length
-   public :: pausing_samples, max_samples_in_step
+   public :: pausing_samples, max_samples_in_step, initial_room
 
    !> Columns of a trace
    character(len=*), parameter :: trace_columns(*) = [character(len=name_length) :: "time", &
@@ -22,6 +22,8 @@ module mesoslip_recording_trace
    integer, parameter :: max_samples_in_step = 1000
    !> Number of samples at which the run pauses so that they are drained
    integer, parameter :: pausing_samples = 20000
+   !> Initial room for samples
+   integer, parameter :: initial_room = 64
 
    !> Share of an interval within which two times are equal
    real(wp), parameter :: time_tolerance = 1.0e-6_wp
@@ -61,8 +63,8 @@ contains
       self%interval = interval
       self%duration = duration
       self%layers = layers
-      call self%rows%open(trace_length, pausing_samples + max_samples_in_step)
-      call self%layer_rows%open(layers, pausing_samples + max_samples_in_step)
+      call self%rows%open(trace_length, initial_room)
+      call self%layer_rows%open(layers, initial_room)
    end subroutine open
 
    !> Begin another run with a sample. Samples of the earlier run continue if this is one of them.

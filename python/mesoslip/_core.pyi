@@ -103,6 +103,26 @@ def rate_and_state_motions(
 def restore_simulation(
     handle: NDArray[np.int64], words: NDArray[np.int64], length: int = ...
 ) -> tuple[int, bytes]: ...
+def run_realizations(
+    handle: NDArray[np.int64],
+    realizations: NDArray[np.int64],
+    initial: str,
+    max_work: float,
+    names: NDArray[np.bytes_],
+    values: NDArray[np.float64],
+    count: int = ...,
+    tables: int = ...,
+    room: int = ...,
+) -> tuple[
+    int,
+    NDArray[np.float64],
+    NDArray[np.int64],
+    NDArray[np.float64],
+    NDArray[np.int32],
+    NDArray[np.int32],
+    int,
+    bytes,
+]: ...
 def save_simulation(handle: NDArray[np.int64]) -> tuple[int, int, bytes]: ...
 def set_avalanches(
     handle: NDArray[np.int64],

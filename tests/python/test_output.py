@@ -186,9 +186,11 @@ def test_blocks_do_not_matter(results, tmp_path, monkeypatch, rows):
         assert_same(tree, files.read(tmp_path / "out.nc"))
 
 
-def test_interrupted_realizations_of_different_length(klein, tmp_path, monkeypatch):
-    """What a realization did not come to is missing; the times are those of the longest."""
-    monkeypatch.setattr(filling, "BLOCK_ROWS", 30)
+@pytest.mark.parametrize(("rows", "chunk"), [(30, (1, 30)), (120, (2, 50)), (10**5, (3, 50))])
+def test_interrupted_realizations_of_different_length(klein, tmp_path, monkeypatch, rows, chunk):
+    """What a realization did not come to is missing; the times are those of the longest. A chunk
+    holds a part of a long realization, or many short ones."""
+    monkeypatch.setattr(filling, "BLOCK_ROWS", rows)
     monkeypatch.setattr(writing, "MIN_COMPRESSED", 10)
     results = run_realizations(klein(**QUICK | {"run__realizations": 3}))
 
@@ -214,6 +216,8 @@ def test_interrupted_realizations_of_different_length(klein, tmp_path, monkeypat
     tree = build_tree(partial)
     writing.write_results(partial, tmp_path / "out.nc")
     assert_same(tree, files.read(tmp_path / "out.nc"))
+    with netCDF4.Dataset(tmp_path / "out.nc") as file:
+        assert tuple(file["spring_force"].chunking()) == chunk
     force = tree["spring_force"].values
     assert tree.attrs["complete"] == "false"
     assert np.isfinite(force).sum(axis=1).tolist() == [3, 50, 20]

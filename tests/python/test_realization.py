@@ -102,6 +102,42 @@ def test_realizations_that_share_their_setting_are_those_made_alone():
         np.testing.assert_array_equal(one.contacts["origin"], alone.contacts["origin"])
 
 
+@pytest.mark.parametrize("kind", [one for one in KINDS if " me" not in one])
+def test_realizations_run_together_are_those_made_alone(kind):
+    """To the bit, unless they are too long for that."""
+    config = configuration(kind)
+    (together,) = Realization.all_of(config, [1])
+    if not Realization.run_together([together]):
+        assert not together.advances
+        return
+    alone = Realization(config, 1)
+    while not alone.finished:
+        alone.advance()
+    for one in (alone, together):
+        one.kernel_seconds = 0.0
+    assert together.save() == alone.save()
+    for table in TABLES:
+        np.testing.assert_array_equal(together.rows(table).read(), alone.rows(table).read(), table)
+
+
+def test_realizations_run_together_end_with_the_first_that_is_long_or_has_started(monkeypatch):
+    config = Config.from_dict(klein_tables(run__realizations=60, **FEW | {"contacts__count": 9}))
+    alone = [Realization(config, number) for number in range(60)]
+    for one in alone:
+        while not one.finished:
+            one.advance()
+    work = sorted(one.advances + one.breaks for one in alone)[30]
+    monkeypatch.setattr(realization, "SEGMENT_WORK", work)
+    some = Realization.all_of(config)
+    some[1].advance(1)
+    assert Realization.run_together(some) <= 1
+    assert some[1].advances <= 2
+    results = run_realizations(config, executor=2)
+    assert results.complete
+    for one, other in zip(results.realizations, alone, strict=True):
+        np.testing.assert_array_equal(one.trace, other.trace)
+
+
 def test_many_short_realizations_are_set_up_once_and_handed_over_in_batches(monkeypatch):
     submitted, checked = [], []
     submit, check = LocalPool.submit, realization.check_memory

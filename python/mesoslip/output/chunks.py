@@ -44,16 +44,16 @@ class _Target:
         is_compressed = dataset.compression is not None
         return cls(dataset, dataset.chunks, dataset.dtype, dataset.fillvalue, is_compressed)
 
-    def packed(self, where: tuple[Any, ...], values: Array) -> _Piece:
+    def packed(self, where: tuple[slice, ...], values: Array) -> _Piece:
         """Values as they are stored, without use of HDF5's library."""
         if self.chunks is None:
             return _Piece(self.dataset, where, values.astype(self.dtype, copy=False))
-        chunk = np.empty(self.chunks, self.dtype)
-        rows = chunk.reshape(-1, *self.chunks[len(where) :])
-        rows[: len(values)] = values
-        rows[len(values) :] = self.fill_value
-        first = [one.start if isinstance(one, slice) else one for one in where]
-        place = (*first, *[0] * (len(self.chunks) - len(first)))
+        if values.shape == self.chunks:
+            chunk = np.ascontiguousarray(values, self.dtype)
+        else:
+            chunk = np.full(self.chunks, self.fill_value, self.dtype)
+            chunk[tuple(map(slice, values.shape))] = values
+        place = (*(one.start for one in where), *[0] * (len(self.chunks) - len(where)))
         return _Piece(
             self.dataset, place, _compressed(chunk) if self.is_compressed else chunk, True
         )
@@ -78,7 +78,7 @@ class _Piece:
 def write_chunks(path: Path, blocks: Iterable[Block], threads: int) -> None:
     """Write blocks to the variables of a netCDF-4 file, arranged and compressed on threads.
 
-    Chunks of variables must have the rows of `filling.block_rows`, and be shuffled if compressed.
+    Chunks of variables must be those of blocks, and shuffled if compressed.
     """
     with _Storage(path, "r+") as storage:
         with h5py.File(storage, "r+") as file:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -10,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip.configuration.config import Config
-from mesoslip.output.layout import DIMENSIONS, Entry, GroupLayout
+from mesoslip.output.layout import Entry, GroupLayout
 from mesoslip.simulation.recorded_tables import BLOCK_NUMBERS as NUMBERS_OF_BLOCK
 
 if TYPE_CHECKING:
@@ -27,52 +28,83 @@ BLOCK_ROWS = 2**16
 @dataclass(frozen=True)
 class Block:
     """Rows of a table, in parts with the indices of their realizations, and the variables of a
-    group that they fill.
+    group that they fill at the index ``where``.
 
-    The index of the rows in a variable, ``where``, is the realization, if variables have that
-    dimension, and a slice that starts at a multiple of `block_rows`.
+    It is a slice of each dimension that belongs to realizations and rows, and begins where a chunk
+    does, see `chunk_shape`.
     """
 
     group: str
     entries: Mapping[str, Entry]
-    where: tuple[Any, ...]
+    where: tuple[slice, ...]
     parts: Sequence[Array]
     owners: Sequence[int]
 
-    def values(self) -> Iterator[tuple[str, tuple[Any, ...], Array]]:
+    def values(self) -> Iterator[tuple[str, tuple[slice, ...], Array]]:
         """The name, index and values of each variable."""
-        shape = (sum(map(len, self.parts)), *self.parts[0].shape[1:])
+        lengths = [len(part) for part in self.parts]
+        shape = (sum(lengths), *self.parts[0].shape[1:])
         # Columns are contiguous.
         rows = np.concatenate(self.parts, out=np.empty(shape, order="F"))
-        owners = np.repeat(self.owners, [len(part) for part in self.parts])
+        owners = np.repeat(self.owners, lengths)
+        place = self._place(owners)
         for name, entry in self.entries.items():
             assert entry.pick is not None
-            where = self.where if entry.is_padded else self.where[-1:]
-            yield name, where, entry.pick(rows, owners)
+            values = entry.pick(rows, owners)
+            yield name, self.where, values if len(self.where) == 1 else place(values)
+
+    def _place(self, owners: Array) -> Callable[[Array], Array]:
+        """How values of the rows become those of realizations and times, NaN after the last."""
+        shape = tuple(one.stop - one.start for one in self.where)
+        if len(owners) == math.prod(shape):
+            return lambda values: values.reshape(*shape, *values.shape[1:])
+        number = owners - self.where[0].start
+        first = np.searchsorted(number, np.arange(shape[0]))
+        where = number, np.arange(len(number)) - first[number]
+
+        def place(values: Array) -> Array:
+            padded = np.full((*shape, *values.shape[1:]), np.nan)
+            padded[where] = values
+            return padded
+
+        return place
 
 
 def blocks(results: Results, layout: Mapping[str, GroupLayout]) -> Iterator[Block]:
-    """The rows of all tables of an output, each once."""
-    longest = int(np.argmax([len(one.rows("trace")) for one in results.realizations]))
+    """The rows of all tables of an output, each once; those of times twice."""
     for group, form in layout.items():
-        for table in dict.fromkeys(entry.table for entry in form.entries.values() if entry.table):
-            of_table = {name: one for name, one in form.entries.items() if one.table == table}
-            # The times, which have no dimension realization, are those of the longest trace.
+        for table, of_table in _by_table(form).items():
             padded = {name: one for name, one in of_table.items() if one.is_padded}
-            for where, parts, owners in _joined(results, table):
-                is_whole = len(where) == 1 or where[0] == longest
-                entries = of_table if is_whole else padded
-                yield Block(group, entries, where, parts, owners)
+            others = {name: one for name, one in of_table.items() if not one.is_padded}
+            if padded:
+                for where, parts, owners in _padded(results, table, layout[""].sizes["time"]):
+                    yield Block(group, padded, where, parts, owners)
+            if others:
+                pieces = _pieces(results, table, _owners(results, is_of_times=bool(padded)))
+                for along, parts, owners in _cut(pieces, block_rows(results.config, table)):
+                    yield Block(group, others, (along,), parts, owners)
 
 
 def row_count(results: Results, layout: Mapping[str, GroupLayout]) -> int:
-    """Number of rows of all tables of an output."""
-    tables = [
-        one
-        for form in layout.values()
-        for one in dict.fromkeys(entry.table for entry in form.entries.values() if entry.table)
-    ]
-    return sum(len(each.rows(one)) for each in results.realizations for one in tables)
+    """Number of rows of all blocks of an output."""
+    count = 0
+    for form in layout.values():
+        for table, entries in _by_table(form).items():
+            lengths = [len(one.rows(table)) for one in results.realizations]
+            has_padded = any(one.is_padded for one in entries.values())
+            count += sum(lengths)
+            if has_padded and not all(one.is_padded for one in entries.values()):
+                count += max(lengths)
+    return count
+
+
+def _by_table(form: GroupLayout) -> dict[str, dict[str, Entry]]:
+    """The variables of a group that are filled by rows, by table."""
+    found: dict[str, dict[str, Entry]] = {}
+    for name, one in form.entries.items():
+        if one.table:
+            found.setdefault(one.table, {})[name] = one
+    return found
 
 
 def reported(
@@ -98,31 +130,65 @@ def block_rows(config: Config, table: str) -> int:
     return max(1, min(BLOCK_ROWS, BLOCK_NUMBERS // width))
 
 
-def _joined(
-    results: Results, table: str
-) -> Iterator[tuple[tuple[Any, ...], list[Array], list[int]]]:
-    """Blocks of a table: index in the output, pieces of rows, the realization of each piece.
+def chunk_shape(config: Config, table: str, samples: int) -> tuple[int, int]:
+    """Realizations and samples of a chunk of a table: many realizations, or a part of one."""
+    rows = block_rows(config, table)
+    return (max(1, rows // max(samples, 1)), min(rows, samples))
 
-    Catalogues have the rows of all realizations one after another.
-    """
-    max_rows, is_ragged = block_rows(results.config, table), table in DIMENSIONS
+
+def _owners(results: Results, *, is_of_times: bool) -> Iterable[int]:
+    """Numbers of all realizations; for times, which have no realization, of the longest trace."""
+    if not is_of_times:
+        return range(len(results.realizations))
+    return [int(np.argmax([len(one.rows("trace")) for one in results.realizations]))]
+
+
+def _pieces(results: Results, table: str, numbers: Iterable[int]) -> Iterator[tuple[int, Array]]:
+    """The rows of a table of some realizations in pieces, each with its realization."""
+    max_rows = block_rows(results.config, table)
+    for number in numbers:
+        rows = results.realizations[number].rows(table)
+        if len(rows):
+            for piece in rows.blocks(max_rows):
+                yield number, piece
+
+
+# Rows: their slice, pieces, and the realization of each piece.
+Cut = tuple[slice, list[Array], list[int]]
+
+
+def _cut(pieces: Iterable[tuple[int, Array]], max_rows: int) -> Iterator[Cut]:
+    """Pieces of rows one after another, cut where a number of rows is reached."""
     start = count = 0
     parts: list[Array] = []
     owners: list[int] = []
-    for number, one in enumerate(results.realizations):
-        before = () if is_ragged else (number,)
-        for piece in one.rows(table).blocks(max_rows):
-            remaining = piece
-            while len(remaining):
-                part, remaining = remaining[: max_rows - count], remaining[max_rows - count :]
-                parts.append(part)
-                owners.append(number)
-                count += len(part)
-                if count == max_rows:
-                    yield (*before, slice(start, start + count)), parts, owners
-                    start, count, parts, owners = start + count, 0, [], []
-        is_last = number == len(results.realizations) - 1
-        if count and (is_last or not is_ragged):
-            yield (*before, slice(start, start + count)), parts, owners
-        if not is_ragged:
-            start, count, parts, owners = 0, 0, [], []
+    for number, piece in pieces:
+        remaining = piece
+        if count + len(piece) < max_rows:
+            parts.append(piece)
+            owners.append(number)
+            count += len(piece)
+            continue
+        while len(remaining):
+            part, remaining = remaining[: max_rows - count], remaining[max_rows - count :]
+            parts.append(part)
+            owners.append(number)
+            count += len(part)
+            if count == max_rows:
+                yield slice(start, start + count), parts, owners
+                start, count, parts, owners = start + count, 0, [], []
+    if count:
+        yield slice(start, start + count), parts, owners
+
+
+def _padded(
+    results: Results, table: str, samples: int
+) -> Iterator[tuple[tuple[slice, slice], list[Array], list[int]]]:
+    """Blocks of a table with a row for each time; see `chunk_shape`."""
+    together, length = chunk_shape(results.config, table, samples)
+    total = len(results.realizations)
+    for first in range(0, total, together):
+        numbers = range(first, min(first + together, total))
+        for along, parts, owners in _cut(_pieces(results, table, numbers), together * length):
+            where = slice(0, samples) if together > 1 else along
+            yield (slice(numbers.start, numbers.stop), where), parts, owners

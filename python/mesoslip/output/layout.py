@@ -21,7 +21,7 @@ from mesoslip.output import variables
 from mesoslip.output.provenance import program_attributes
 from mesoslip.output.variables import Group, Meaning
 from mesoslip.simulation import recorded_tables as tables
-from mesoslip.simulation.audit import failed_checks
+from mesoslip.simulation.audit import failed_checks, largest, share_of_work
 from mesoslip.simulation.fronts import FRONT_COLUMNS
 
 if TYPE_CHECKING:
@@ -212,8 +212,14 @@ def _root(results: Results) -> GroupLayout:
         totals.append("slip_time_error")
     if config.has_avalanches:
         totals += ["avalanche_count", "avalanche_slip"]
+    energies = np.array([one.energy for one in realizations])
     for name in totals:
-        group.add(name, each, values=[getattr(one, name) for one in realizations])
+        values = (
+            share_of_work(config, energies, "residual")
+            if name == "energy_residual"
+            else [getattr(one, name) for one in realizations]
+        )
+        group.add(name, each, values=values)
     if config.has_avalanches:
         group.add("end_displacement", each, values=[one.displacement for one in realizations])
     return GroupLayout(sizes, group.entries, attributes(results))
@@ -368,7 +374,8 @@ def attributes(results: Results) -> dict[str, Any]:
     attributes["complete"] = "true" if results.complete else "false"
     if not results.complete:
         attributes["comment"] = interruption(realizations)
-    residual: float = max((one.energy_residual for one in realizations), key=abs)
+    energies = np.array([one.energy for one in realizations])
+    residual = largest(share_of_work(config, energies, "residual"))
     return attributes | {
         "break_count": sum(one.breaks for one in realizations),
         "ending": "; ".join(sorted({one.ending for one in realizations})),

@@ -97,10 +97,12 @@ def _create_group(
 
 
 def _storage(entry: Entry, shape: list[int], config: Config) -> dict[str, Any]:
-    """Chunks of a variable, each a block of rows of one realization, and compression."""
+    """Chunks of a variable, each of one block of rows, and compression."""
     if math.prod(shape) <= MIN_COMPRESSED or not entry.table:
         return {}
-    chunks = [1, *shape[1:]] if entry.is_padded else list(shape)
-    along = 1 if entry.is_padded else 0
-    chunks[along] = min(shape[along], filling.block_rows(config, entry.table))
+    if entry.is_padded:
+        chunks = (*filling.chunk_shape(config, entry.table, shape[1]), *shape[2:])
+        chunks = (min(chunks[0], shape[0]), *chunks[1:])
+    else:
+        chunks = (min(shape[0], filling.block_rows(config, entry.table)), *shape[1:])
     return {"chunksizes": chunks, **(COMPRESSION if entry.shrinks else {})}

@@ -17,27 +17,30 @@ import threading
 import time
 import tomllib
 import zlib
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, suppress
+from array import array
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from importlib.metadata import version
 from itertools import count
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mesoslip import _build
 from mesoslip.configuration.differences import by_dotted_key
 from mesoslip.errors import FileError
 from mesoslip.execution.store import Folder
 from mesoslip.simulation.realization import Realization, Saved
-from mesoslip.simulation.recorded_tables import TABLES, Rows, Stored
+from mesoslip.simulation.recorded_tables import MAX_SMALL_BYTES, TABLES, RowFile, Rows, Stored
+from mesoslip.simulation.saved_states import NUMBERS, from_arrays, to_arrays
 
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
 
 # Version of the files' content; only the program that started a run resumes it.
-FORMAT = 1
+FORMAT = 2
 
 # Wall time between two checkpoints [s].
 INTERVAL = 60.0
@@ -97,9 +100,15 @@ class Checkpoint:
         # The running version: another one may be installed before a checkpoint is written.
         self._program = _program()
         self._sizes = dict.fromkeys(TABLES, 0)
-        # By number of the realization: the latest state with its epoch, and those with new rows.
+        # By number of the realization: the latest state with its epoch.
         self._saved: dict[int, tuple[int, Saved]] = {}
+        # Those that are over, which no longer change.
+        self._over: dict[int, Realization] = {}
+        # Those with new rows.
         self._grown: dict[int, Realization] = {}
+        # By table: number of the realization, place, rows, columns and checksum of each piece in
+        # the files, one after another.
+        self._pieces: dict[str, array[int]] = {table: array("q") for table in TABLES}
         # Rows of these in memory [bytes]: of each when it was visited, and of all.
         self._waiting: dict[int, int] = {}
         self._waiting_bytes = 0
@@ -119,19 +128,23 @@ class Checkpoint:
 
     # Called by the threads of realizations.
 
-    def visit(self, realization: Realization) -> None:
-        """Save a realization between two segments, if a checkpoint is due or the run is over."""
-        epoch, _ = self._saved.get(realization.number, (-1, None))
-        saved = None
-        if epoch < self._epoch or realization.finished:
-            saved = realization.save()
-        waiting = sum(rows.waiting_bytes for _, rows in realization.waiting)
-        with self._lock:
-            self._waiting_bytes += waiting - self._waiting.get(realization.number, 0)
-            self._waiting[realization.number] = waiting
-            self._grown[realization.number] = realization
-            if saved is not None:
-                self._saved[realization.number] = (self._epoch, saved)
+    def visit(self, *realizations: Realization) -> None:
+        """Note realizations between two segments, and save those that are not over if a checkpoint
+        is due."""
+        for one in realizations:
+            epoch, _ = self._saved.get(one.number, (-1, None))
+            is_over = one.finished
+            saved = one.save() if epoch < self._epoch and not is_over else None
+            waiting = sum(rows.waiting_bytes for _, rows in one.waiting)
+            with self._lock:
+                self._waiting_bytes += waiting - self._waiting.get(one.number, 0)
+                self._waiting[one.number] = waiting
+                self._grown[one.number] = one
+                if is_over:
+                    self._over[one.number] = one
+                    self._saved.pop(one.number, None)
+                elif saved is not None:
+                    self._saved[one.number] = (self._epoch, saved)
 
     # Called by the main thread.
 
@@ -155,7 +168,10 @@ class Checkpoint:
         """Write a checkpoint of a run that is not advancing; returns whether that succeeded."""
         self._epoch += 1
         for one in realizations:
-            if one.advances > 0:
+            if one.finished:
+                self._over[one.number] = one
+                self._saved.pop(one.number, None)
+            elif one.advances > 0:
                 self._saved[one.number] = (self._epoch, one.save())
         return self._write(realizations)
 
@@ -233,30 +249,40 @@ class Checkpoint:
 
     def _flush(self, realizations: Sequence[Realization]) -> None:
         """Append rows in memory to the files."""
-        files: dict[str, IO[bytes]] = {}
-        with ExitStack() as stack:
-            for one in realizations:
-                with self._lock:
-                    self._grown.pop(one.number, None)
-                    self._waiting_bytes -= self._waiting.pop(one.number, 0)
-                for table, rows in one.waiting:
-                    for number, values in rows.waiting():
-                        if table not in files:
-                            mode = "r+b" if self._sizes[table] else "xb"
-                            file = self._files.open(ROWS.format(table), mode)
-                            files[table] = stack.enter_context(file)
-                        rows.store(number, self._append(files[table], table, values))
-
-    def _append(self, file: IO[bytes], table: str, values: Any) -> Stored:
-        place = self._sizes[table]
-        data = np.ascontiguousarray(values, dtype=np.float64)
-        file.seek(place)
-        file.write(data.data)
-        # An error of the disk is that of these rows.
-        file.flush()
-        self._sizes[table] = place + data.nbytes
-        path, shape = self.folder / ROWS.format(table), (data.shape[0], data.shape[1])
-        return Stored(path, place, shape, zlib.crc32(data.data))
+        waiting: dict[str, list[tuple[Realization, Rows]]] = {}
+        for one in realizations:
+            with self._lock:
+                self._grown.pop(one.number, None)
+                self._waiting_bytes -= self._waiting.pop(one.number, 0)
+            for table, rows in one.waiting:
+                if rows.waiting_bytes:
+                    waiting.setdefault(table, []).append((one, rows))
+        for table, all_rows in waiting.items():
+            place = self._sizes[table]
+            appended: list[tuple[Rows, list[Stored | None]]] = []
+            found = array("q")
+            with self._files.open(ROWS.format(table), "r+b" if place else "xb") as file:
+                store = RowFile(self.folder / ROWS.format(table))
+                file.seek(place)
+                for one, rows in all_rows:
+                    stored: list[Stored | None] = []
+                    for values in rows.waiting():
+                        data = np.ascontiguousarray(values)
+                        length, columns = data.shape
+                        checksum = zlib.crc32(data.data)
+                        file.write(data.data)
+                        large = data.nbytes > MAX_SMALL_BYTES
+                        stored.append(
+                            Stored(store, place, (length, columns), checksum) if large else None
+                        )
+                        found.extend((one.number, place, length, columns, checksum))
+                        place += data.nbytes
+                    appended.append((rows, stored))
+            # After an error of the disk none of them is in the file.
+            self._sizes[table] = place
+            self._pieces[table].extend(found)
+            for rows, stored in appended:
+                rows.store(stored)
 
     def _write(self, realizations: Sequence[Realization]) -> bool:
         self._last = time.perf_counter()
@@ -272,35 +298,21 @@ class Checkpoint:
     def _write_state(self, realizations: Sequence[Realization]) -> None:
         # Before rows are written: a realization that ends meanwhile is saved with more rows.
         with self._lock:
-            saved = {number: one for number, (_, one) in self._saved.items()}
-        self._flush([realizations[number] for number in saved])
+            running = {number: one for number, (_, one) in self._saved.items()}
+            over = dict(self._over)
+        self._flush([realizations[number] for number in (*running, *over)])
         for table, size in self._sizes.items():
             if size:
                 with self._files.open(ROWS.format(table), "r+b") as file:
                     file.truncate(size)
                     os.fsync(file.fileno())
-        arrays: dict[str, Any] = {}
-        tables: dict[str, list[tuple[int, ...]]] = {table: [] for table in TABLES}
-        for number, one in saved.items():
-            if one.words is not None:
-                arrays[f"words.{number}"] = one.words
-            for table, rows in realizations[number].waiting:
-                remaining = one.counts.get(table, 0)
-                for piece in rows.pieces:
-                    if remaining <= 0:
-                        break
-                    assert isinstance(piece, Stored)
-                    tables[table].append((number, piece.place, *piece.shape, piece.checksum))
-                    remaining -= len(piece)
-        for table, pieces in tables.items():
-            arrays[f"pieces.{table}"] = np.array(pieces, dtype=np.int64).reshape(-1, 5)
+        arrays: dict[str, Any] = to_arrays(running, over.values())
+        for table in TABLES:
+            counts = zip(arrays[NUMBERS].tolist(), arrays[f"counts.{table}"].tolist(), strict=True)
+            arrays[f"pieces.{table}"] = _first_rows(self._pieces[table], dict(counts))
         header = self._program | {
             "configuration": self._config.to_toml(),
             "wall_seconds": self._earlier_seconds + time.perf_counter() - self._start,
-            "realizations": {
-                number: {"scalars": one.scalars, "counts": one.counts}
-                for number, one in saved.items()
-            },
         }
         with self._files.written(STATE, keep=PREVIOUS) as file:
             np.savez(file, header=np.array(json.dumps(header)), **arrays)
@@ -318,25 +330,31 @@ class Checkpoint:
         self._compare(header)
         if missing := {f"pieces.{table}" for table in TABLES} - arrays.keys():
             raise DamagedError(f"without {min(missing)}")
+        try:
+            states = from_arrays(arrays)
+        except (LookupError, TypeError, ValueError) as error:
+            raise DamagedError(str(error)) from error
         sizes = dict.fromkeys(TABLES, 0)
-        kept = {int(text): one for text, one in header["realizations"].items()}
-        tables = {
-            number: {table: Rows(columns) for table, columns in one["scalars"]["columns"].items()}
-            for number, one in kept.items()
-        }
+        tables: dict[int, dict[str, Rows]] = {number: {} for number in states}
         for table in TABLES:
             pieces = arrays[f"pieces.{table}"].tolist()
             for number, stored in self._stored(ROWS.format(table), pieces):
-                tables[number][table].add(stored)
+                rows = tables[number].setdefault(table, Rows(stored.shape[1]))
+                rows.add(stored)
                 sizes[table] = max(sizes[table], stored.end)
-        for number, one in kept.items():
-            if {table: len(rows) for table, rows in tables[number].items()} != one["counts"]:
+        for number, one in states.items():
+            if {table: len(rows) for table, rows in tables[number].items()} != one.counts:
                 raise DamagedError("rows are missing")
         # No realization is restored unless all can be.
-        for number, one in kept.items():
-            saved = Saved(one["scalars"], one["counts"], arrays.get(f"words.{number}"))
-            realizations[number].restore(saved, tables[number])
-            self._saved[number] = (0, saved)
+        for number, one in states.items():
+            realizations[number].restore(one, tables[number])
+            if realizations[number].finished:
+                self._over[number] = realizations[number]
+            else:
+                self._saved[number] = (0, one)
+        self._pieces = {
+            table: array("q", arrays[f"pieces.{table}"].ravel().tolist()) for table in TABLES
+        }
         self._sizes = sizes
         self._earlier_seconds = float(header["wall_seconds"])
         return self._earlier_seconds
@@ -352,10 +370,11 @@ class Checkpoint:
         """Numbers of realizations and their rows in a file, which must be as they were written."""
         if not pieces:
             return
+        store = RowFile(self.folder / name)
         try:
             with self._files.open(name, "rb") as file:
                 for number, place, length, columns, checksum in pieces:
-                    stored = Stored(self.folder / name, place, (length, columns), checksum)
+                    stored = Stored(store, place, (length, columns), checksum)
                     if not stored.is_whole(file):
                         raise DamagedError(f"{name} differs from the rows that the run wrote")
                     yield number, stored
@@ -382,6 +401,18 @@ class Checkpoint:
                 + _difference(header["configuration"], self._config.to_toml())
                 + advice
             )
+
+
+def _first_rows(pieces: array[int], counts: Mapping[int, int]) -> NDArray[np.int64]:
+    """The pieces of the first rows of realizations, given how many rows each has; shape (pieces,
+    5), see `Checkpoint`."""
+    found = np.array(pieces, dtype=np.int64).reshape(-1, 5)
+    remaining = dict(counts)
+    kept = np.zeros(len(found), dtype=bool)
+    for place, (number, length) in enumerate(found[:, [0, 2]].tolist()):
+        kept[place] = remaining.get(number, 0) > 0
+        remaining[number] = remaining.get(number, 0) - length
+    return found[kept]
 
 
 def _not_read(path: Path, error: OSError) -> FileError:

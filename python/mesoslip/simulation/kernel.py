@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import threading
 import weakref
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip import _core
-from mesoslip.configuration.kernel_parameters import Named, Parameters, named
+from mesoslip.configuration.kernel_parameters import Named, Parameters, named, padded
 from mesoslip.errors import RunError
 from mesoslip.memory_limit import RESERVE, is_memory_short
 
@@ -20,6 +20,8 @@ Words = NDArray[np.int64]
 
 # Maximum number of names in a list.
 MAX_NAMES = 64
+# Room for the numbers in all rows of short realizations.
+SHORT_NUMBERS = 2**18
 
 
 class Progress(NamedTuple):
@@ -42,6 +44,10 @@ class Progress(NamedTuple):
     avalanches: int
     integrator_counts: NDArray[np.int64]
     """Steps, evaluations and failed steps of the slider's integrator, if it has one."""
+
+
+# A realization at its end: progress, terms of the energy balance [J], rows by table.
+Completed = tuple[Progress, Array, dict[str, Array]]
 
 
 def checked(results: Any) -> tuple[Any, ...]:
@@ -188,6 +194,40 @@ class Kernel:
         check_reserve()
         self._call(_core.advance_simulation, max_advances, max_work)
 
+    def run_realizations(
+        self, numbers: Sequence[int], initial: str, tables: Sequence[str], max_work: float
+    ) -> list[Completed]:
+        """Run realizations of this simulation, which is not started, each to its end, up to one
+        that is long, records much or fails; tables without rows are left out."""
+        check_reserve()
+        values = np.empty(SHORT_NUMBERS)
+        done, *results, columns, rows = self._call(
+            _core.run_realizations,
+            np.array(numbers, dtype=np.int64),
+            initial,
+            max_work,
+            padded(tables),
+            values,
+        )
+        progress, counts, energy, lengths = (one.T[:done] for one in (*results, rows))
+        # Rows keep no more memory than they need.
+        values = values[: int(np.sum(lengths * columns))].copy()
+        widths = tuple(zip(tables, columns.tolist(), strict=True))
+        completed: list[Completed] = []
+        start = 0
+        for reals, (ending, advances, avalanches, *_), integrator, terms, several in zip(
+            progress.tolist(), counts.tolist(), counts[:, 3:], energy, lengths.tolist(), strict=True
+        ):
+            found = {}
+            for (table, width), length in zip(widths, several, strict=True):
+                if length:
+                    end = start + length * width
+                    found[table] = values[start:end].reshape(length, width)
+                    start = end
+            now = Progress._make((ENDING_NAMES[ending], *reals, advances, avalanches, integrator))
+            completed.append((now, terms, found))
+        return completed
+
     def ask(self) -> Progress:
         """The present progress."""
         ending, *numbers = self._call(_core.ask_simulation)
@@ -245,5 +285,6 @@ def name_list(which: str) -> tuple[str, ...]:
     return tuple(str(name) for name in np.char.strip(np.char.decode(names[:count])))
 
 
-# Tables that a simulation records.
+# Tables that a simulation records, and reasons why it is over by their numbers.
 TABLE_NAMES = name_list("tables")
+ENDING_NAMES = ("", *name_list("endings"))

@@ -8,8 +8,9 @@ from __future__ import annotations
 import math
 import threading
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import takewhile
 from typing import Any, Self
 
 import numpy as np
@@ -17,8 +18,9 @@ import numpy as np
 from mesoslip.configuration import arguments
 from mesoslip.configuration.config import Config
 from mesoslip.errors import RunError
+from mesoslip.simulation.audit import share_of_work
 from mesoslip.simulation.fronts import FrontFinder
-from mesoslip.simulation.kernel import Array, Kernel, Words
+from mesoslip.simulation.kernel import Array, Completed, Kernel, Progress, Words
 from mesoslip.simulation.kernel_setup import KernelSetup, tables_of
 from mesoslip.simulation.memory import check_memory
 from mesoslip.simulation.recorded_tables import (
@@ -42,9 +44,6 @@ ENDINGS = {
     "displacement": "displacement of the slider reached",
     "steady": "steady state reached",
 }
-
-# Minimum scale of energy residuals, over the energy of all contacts about to break.
-MIN_ENERGY_RATIO = 1e-9
 
 # Terms of the energy balance before the first advance.
 NO_ENERGY = np.full(len(ENERGY_COLUMNS), np.nan)
@@ -142,6 +141,22 @@ class Realization(Recorded):
         Steps, evaluations and failed steps of the slider's integrator, if it has one.
     """
 
+    # A run may have 10⁵ of them.
+    __slots__ = (
+        *("config", "number", *SAVED_ATTRIBUTES, "integrator_counts", "_parameters", "_coarse"),
+        *(
+            "_lacks_errors",
+            "_has_steps",
+            "_is_discrete",
+            "_after",
+            "_start",
+            "_energy",
+            "_recorded",
+            "_fronts",
+        ),
+        *("_setup", "_kernel", "_words", "_work", "_lock"),
+    )
+
     @arguments.checked(
         config=arguments.instance(Config, "a Config"),
         number=arguments.whole(0),
@@ -180,6 +195,7 @@ class Realization(Recorded):
         self._lacks_errors = False
         longer = contacts.coarse_parameters(config, coarsening)
         self._has_steps = longer is not None
+        self._is_discrete = contacts.is_discrete
         if longer is not None:
             self._parameters = longer
             self._lacks_errors = estimates_errors and after is None
@@ -208,8 +224,13 @@ class Realization(Recorded):
     def _sibling(self, number: int) -> Realization:
         """Another realization, of which neither has started."""
         other = object.__new__(type(self))
-        other.__dict__.update(self.__dict__, number=number, _tables={}, _lock=threading.Lock())
-        other._fronts = front_finder(self.config)
+        for name in Realization.__slots__:
+            setattr(other, name, getattr(self, name))
+        other.number = number
+        other._tables = {}
+        other._lock = threading.Lock()
+        if self._fronts is not None:
+            other._fronts = front_finder(self.config)
         return other
 
     def _open(self) -> Kernel:
@@ -343,9 +364,15 @@ class Realization(Recorded):
 
     def _take(self, kernel: Kernel) -> None:
         """Take the recorded rows and the progress of the kernel."""
-        progress = self._start.progress_since(kernel.ask())
+        progress = kernel.ask()
+        energy = kernel.energy() if progress.ending else None
+        self._adopt(progress, energy, kernel.drain(*self._recorded))
+
+    def _adopt(self, progress: Progress, energy: Array | None, tables: dict[str, Array]) -> None:
+        """Take recorded rows, the progress, and at the end the terms of the energy balance."""
+        progress = self._start.progress_since(progress)
         with self._lock:
-            for table, rows in kernel.drain(*self._recorded).items():
+            for table, rows in tables.items():
                 values = self._start.rows_since(table, rows)
                 self._add(table, values)
                 if table == "ruptures" and self._fronts is not None:
@@ -353,7 +380,7 @@ class Realization(Recorded):
                     self._add("fronts", self._fronts.add(values, is_last=is_last))
             self.time = progress.time
             self.breaks = progress.breaks
-            if self.config.contact_kind.is_discrete:
+            if self._is_discrete:
                 self.breaks = int(progress.breaks)
             self.detached = progress.detached
             self.advances = progress.advances
@@ -362,14 +389,42 @@ class Realization(Recorded):
             self.displacement = progress.displacement
             if not self._has_steps:
                 self.force_error = progress.force_error
-            self.integrator_counts = progress.integrator_counts.copy()
+            self.integrator_counts = progress.integrator_counts
             self.ending = ENDINGS[progress.ending]
-            self._energy = self._start.energy_since(kernel.energy()) if self.ending else None
+            self._energy = None if energy is None else self._start.energy_since(energy)
+
+    @staticmethod
+    def run_together(realizations: Sequence[Realization]) -> int:
+        """Run realizations of `all_of`, each from start to end, in one call of the kernel, up to
+        one that has started, is long, records much or fails; returns how many have run."""
+        first = realizations[0]
+        realizations = list(takewhile(lambda one: one._is_new, realizations))
+        if not realizations or first._setup is None or first._lacks_errors or first._fronts:
+            return 0
+        start = time.perf_counter()
+        kernel = first._setup.open(first.number)
+        try:
+            completed: list[Completed] = kernel.run_realizations(
+                [one.number for one in realizations],
+                first.config.contacts.initial,
+                first._recorded,
+                SEGMENT_WORK,
+            )
+        finally:
+            kernel.close()
+        seconds = (time.perf_counter() - start) / max(1, len(completed))
+        for one, result in zip(realizations, completed, strict=False):
+            one._adopt(*result)
+            one.kernel_seconds = seconds
+        return len(completed)
 
     def _add(self, table: str, values: Array) -> None:
         """Add rows of a table."""
         if len(values):
-            self._tables.setdefault(table, Rows(values.shape[1])).add(values)
+            rows = self._tables.get(table)
+            if rows is None:
+                rows = self._tables[table] = Rows(values.shape[1])
+            rows.add(values)
 
     def close(self) -> None:
         """Free the memory of the kernel, when the run is not continued."""
@@ -379,6 +434,11 @@ class Realization(Recorded):
         if self._coarse is not None:
             self._coarse.close()
             self._coarse = None
+
+    @property
+    def _is_new(self) -> bool:
+        """Whether it has not started."""
+        return self._kernel is None and self._words is None and self.advances == 0
 
     @property
     def is_open(self) -> bool:
@@ -421,21 +481,13 @@ class Realization(Recorded):
     def energy_residual(self) -> float:
         """Residual of the energy balance, relative to the work of the drive, forth and back, or the
         largest term."""
-        return self._part_of_work(self.energy[-1])
+        return float(share_of_work(self.config, self.energy, "residual"))
 
     @property
     def step_work(self) -> float:
         """Work on the contact force in steps beyond that on the contacts, relative to the work of
         the drive; 0 where contacts are kept one by one."""
-        return self._part_of_work(self.energy[ENERGY_COLUMNS.index("step_work")])
-
-    def _part_of_work(self, term: float) -> float:
-        contacts, energy = self.config.contacts, self.energy
-        # The minimum scale is for runs in which hardly any work is done.
-        unit = contacts.static_force**2 / contacts.stiffness
-        # Cycles may return all of the work.
-        scale = energy[ENERGY_COLUMNS.index("gross_work")] or float(np.max(np.abs(energy)))
-        return float(term / max(scale, MIN_ENERGY_RATIO * unit))
+        return float(share_of_work(self.config, self.energy, "step_work"))
 
     @property
     def contacts(self) -> dict[str, Array]:
@@ -467,12 +519,20 @@ class Realization(Recorded):
         scalars = {name: getattr(self, name) for name in SAVED_ATTRIBUTES} | {
             "integrator_counts": self.integrator_counts.tolist(),
             "energy": None if self._energy is None else self._energy.tolist(),
-            "columns": {table: rows.columns for table, rows in self._tables.items()},
         }
-        if self._fronts is not None:
-            scalars["fronts"] = self._fronts.save()
-        counts = {table: len(rows) for table, rows in self._tables.items()}
-        return Saved(scalars, counts, words)
+        fronts = self.save_fronts()
+        if fronts is not None:
+            scalars["fronts"] = fronts
+        return Saved(scalars, self.counts, words)
+
+    def save_fronts(self) -> dict[str, Any] | None:
+        """What a checkpoint keeps of fronts that are not over; None for sliders without any."""
+        return None if self._fronts is None else self._fronts.save()
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Number of rows by table."""
+        return {table: len(rows) for table, rows in self._tables.items()}
 
     @arguments.checked(saved=arguments.instance(Saved, "what save returns"), tables=arguments.table)
     def restore(self, saved: Saved, tables: dict[str, Rows]) -> None:

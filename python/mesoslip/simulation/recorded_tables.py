@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+import os
 import threading
+import weakref
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
@@ -14,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip.errors import RunError, shown
-from mesoslip.execution.regular_files import open_regular
+from mesoslip.execution.regular_files import regular_descriptor
 from mesoslip.simulation.fronts import FRONT_COLUMNS
 from mesoslip.simulation.kernel import name_list
 
@@ -57,6 +59,9 @@ BLOCK_NUMBERS = (
 # Sentinel: the stretch of a detached contact.
 DETACHED = 1e300
 
+# Length of rows of which a place in a file would take as much memory [bytes].
+MAX_SMALL_BYTES = 1024
+
 
 def structured(values: Array, columns: Sequence[str]) -> NDArray[np.void]:
     """Rows of shape (rows, columns) as a structured array of shape (rows) with named columns."""
@@ -64,11 +69,37 @@ def structured(values: Array, columns: Sequence[str]) -> NDArray[np.void]:
     return np.ascontiguousarray(values).view(row)[:, 0]
 
 
+class RowFile:
+    """A file of rows, which stays open from the first reading on."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._number: int | None = None
+
+    def read(self, place: int, count: int) -> Array:
+        """Numbers from a place [bytes] on, fewer at the end of the file.
+
+        Raises a `RunError` if they cannot be read.
+        """
+        try:
+            if self._number is None:
+                self._number = regular_descriptor(self._path, os.O_RDONLY)
+                weakref.finalize(self, os.close, self._number)
+            values = np.empty(count)
+            length = os.preadv(self._number, [values.data.cast("B")], place)
+        except OSError as error:
+            raise RunError(f"{self._path}: cannot be read: {error.strerror}") from error
+        return values[: length // values.itemsize]
+
+    def __str__(self) -> str:
+        return str(self._path)
+
+
 @dataclass(slots=True)
 class Stored:
     """Rows in a file, from ``place`` [bytes] on."""
 
-    path: Path
+    file: RowFile
     place: int
     shape: tuple[int, int]
     checksum: int
@@ -83,22 +114,16 @@ class Stored:
 
     def load(self) -> Array:
         """Read them; raises a `RunError` if they differ from the written rows."""
-        try:
-            with open_regular(self.path, "rb") as file:
-                values = self._read(file)
-        except OSError as error:
-            raise RunError(f"{self.path}: cannot be read: {error.strerror}") from error
+        values = self.file.read(self.place, math.prod(self.shape))
         if not self._equals(values):
-            raise RunError(f"{self.path}: damaged: it differs from the rows that the run wrote")
+            raise RunError(f"{self.file}: damaged: it differs from the rows that the run wrote")
         return values.reshape(self.shape)
 
     def is_whole(self, file: IO[bytes]) -> bool:
         """Whether their file, which is open, has the written rows."""
-        return self._equals(self._read(file))
-
-    def _read(self, file: IO[bytes]) -> Array:
         file.seek(self.place)
-        return np.fromfile(file, dtype=np.float64, count=math.prod(self.shape))
+        values = np.fromfile(file, dtype=np.float64, count=math.prod(self.shape))
+        return self._equals(values)
 
     def _equals(self, values: Array) -> bool:
         return values.size == math.prod(self.shape) and zlib.crc32(values.data) == self.checksum
@@ -107,14 +132,17 @@ class Stored:
 class Rows:
     """The rows of a table of one realization, in pieces; ``columns`` is the length of a row.
 
-    The thread of the realization adds pieces; another one moves them into files.
+    The thread of the realization adds pieces; another one writes them to files.
     """
+
+    __slots__ = ("_count", "_lock", "_written", "columns", "pieces", "waiting_bytes")
 
     def __init__(self, columns: int) -> None:
         self.columns = columns
         self.pieces: list[Array | Stored] = []
-        # Memory of the pieces that are not in a file yet.
+        # Memory of the pieces that are not in a file yet, and number of those that are.
         self.waiting_bytes = 0
+        self._written = 0
         self._lock = threading.Lock()
         self._count = 0
 
@@ -130,23 +158,24 @@ class Rows:
             self._count += len(values)
             if isinstance(values, np.ndarray):
                 self.waiting_bytes += values.nbytes
+            else:
+                self._written += 1
 
-    def waiting(self) -> list[tuple[int, Array]]:
-        """Pieces that are not in a file yet, with their numbers."""
+    def waiting(self) -> list[Array]:
+        """Pieces that are not in a file yet."""
         with self._lock:
-            return [
-                (number, one)
-                for number, one in enumerate(self.pieces)
-                if isinstance(one, np.ndarray)
-            ]
+            return [one for one in self.pieces[self._written :] if isinstance(one, np.ndarray)]
 
-    def store(self, number: int, stored: Stored) -> None:
-        """Replace a piece by its place in a file."""
+    def store(self, stored: Iterable[Stored | None]) -> None:
+        """Note that the next pieces are in a file, where those stay only that have a place."""
         with self._lock:
-            piece = self.pieces[number]
-            if isinstance(piece, np.ndarray):
+            for one in stored:
+                piece = self.pieces[self._written]
+                assert isinstance(piece, np.ndarray)
                 self.waiting_bytes -= piece.nbytes
-            self.pieces[number] = stored
+                if one is not None:
+                    self.pieces[self._written] = one
+                self._written += 1
 
     def blocks(self, max_rows: int) -> Iterator[Array]:
         """The rows in their order, at most ``max_rows`` at a time."""
@@ -154,6 +183,9 @@ class Rows:
             pieces = list(self.pieces)
         for piece in pieces:
             values = piece.load() if isinstance(piece, Stored) else piece
+            if len(values) <= max_rows:
+                yield values
+                continue
             for start in range(0, len(values), max_rows):
                 yield values[start : start + max_rows]
 
@@ -162,6 +194,10 @@ class Rows:
         return np.concatenate(
             [np.empty((0, self.columns)), *self.blocks(max(1, len(self)))], dtype=np.float64
         )
+
+
+# Of tables without rows.
+NO_ROWS = {table: Rows(len(columns)) for table, columns in COLUMNS.items()}
 
 
 class FirstRows:
@@ -215,6 +251,8 @@ class SnapshotRows:
 class Recorded:
     """Rows that a run has recorded, by table."""
 
+    __slots__ = ("_tables",)
+
     def __init__(self) -> None:
         self._tables: dict[str, Rows] = {}
 
@@ -222,8 +260,8 @@ class Recorded:
         """Rows of one of `TABLES`; samples around a slip come with the slip's row."""
         if not isinstance(table, str) or table not in COLUMNS:
             raise RunError(f"there is no table {shown(table)}, but there are {', '.join(COLUMNS)}")
-        rows = self._tables.get(table) or Rows(len(COLUMNS[table]))
-        if table == "slip_trace":
+        rows = self._tables.get(table, NO_ROWS[table])
+        if table == "slip_trace" and len(rows):
             return FirstRows(rows, self._slip_samples(rows))
         if table == "snapshots":
             return SnapshotRows(rows)

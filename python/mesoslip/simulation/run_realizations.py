@@ -126,9 +126,13 @@ class _Run:
     def _advance_all(self, batch: Sequence[Realization], stop: Stop) -> float:
         """Advance realizations to their ends, on a thread; returns the time that it took [s]."""
         start = time.perf_counter()
-        for one in batch:
-            self._advance(one, stop)
+        run_in_turn(batch, stop, lambda one: self._advance(one, stop), self._visit)
         return time.perf_counter() - start
+
+    def _visit(self, realizations: Sequence[Realization]) -> None:
+        """Keep realizations that came to their ends."""
+        if self._checkpoint is not None:
+            self._checkpoint.visit(*realizations)
 
     def _advance(self, realization: Realization, stop: Stop) -> None:
         """Advance a realization to its end."""
@@ -182,16 +186,41 @@ def compute_realizations(
     Returns the time that it took [s]; the state of each at the end, and its tables.
     """
     tables, numbers = piece
-    start, results = time.perf_counter(), []
-    for realization in Realization.all_of(Config.from_dict(tables), numbers):
+    start = time.perf_counter()
+    realizations = Realization.all_of(Config.from_dict(tables), numbers)
+
+    def advance(realization: Realization) -> None:
         try:
             while not (realization.finished or stop.is_set()):
                 realization.advance()
         finally:
             realization.close()
-        rows = {name: rows.read() for name, rows in realization.waiting}
-        results.append((realization.save(), rows))
+
+    run_in_turn(realizations, stop, advance)
+    results = [
+        (one.save(), {name: rows.read() for name, rows in one.waiting}) for one in realizations
+    ]
     return time.perf_counter() - start, results
+
+
+def run_in_turn(
+    realizations: Sequence[Realization],
+    stop: StopRequest,
+    advance: Callable[[Realization], None],
+    visit: Callable[[Sequence[Realization]], None] = lambda _: None,
+) -> None:
+    """Run realizations one after another, short ones of several many at a time.
+
+    ``advance`` runs one of them, ``visit`` is called with those that have run together.
+    """
+    remaining = realizations
+    while remaining and not stop.is_set():
+        done = Realization.run_together(remaining) if len(realizations) > 1 else 0
+        visit(remaining[:done])
+        if done == 0:
+            advance(remaining[0])
+            done = 1
+        remaining = remaining[done:]
 
 
 def _restore(

@@ -37,17 +37,32 @@ LIMITS_HEADER = "spring stiffer than"
 MAX_WORK = 400_000
 
 
-def info(config: ConfigArgument, changes: SetOption = None, as_json: JsonOption = False) -> None:
-    """Print derived quantities, and the predicted stability."""
-    from mesoslip.theory.derived import derived, verdict
+def info(
+    config: ConfigArgument,
+    changes: SetOption = None,
+    is_complete: Annotated[
+        bool, typer.Option("--all", help="Print all derived quantities")
+    ] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Print the predicted motion, and derived quantities.
+
+    Without --all only the first few quantities are printed; JSON has all that are derived.
+    """
+    from mesoslip.theory.derived import derived, overview, verdict
 
     checked = load(config, changes)
     quantities = derived(checked)
     if as_json:
         print_json({name: one.value for name, one in quantities.items()})
         return
-    for name, one in quantities.items():
+    first = overview(checked, quantities)
+    shown = first | quantities if is_complete else first
+    for name, one in shown.items():
         show(name, one.value, one.unit, one.meaning, digits=DERIVED_DIGITS)
+    remaining = len(quantities.keys() - shown.keys())
+    if remaining:
+        typer.echo(f"{remaining} more quantities: --all")
     for message in (
         verdict(checked),
         checked.unreached_drive,

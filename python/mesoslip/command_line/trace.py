@@ -132,7 +132,10 @@ def trace(
         bool, typer.Option("--verbose", help="Print each sampling rate, with its noise")
     ] = False,
 ) -> None:
-    """Read a measured trace as the laboratory wrote it, and write an output like that of a run."""
+    """Read a measured trace, and write it as an output.
+
+    The file is read as the laboratory wrote it; the output is like that of a run.
+    """
     from mesoslip.measured.batch import output_name
     from mesoslip.measured.trace import trace_of, understand
     from mesoslip.output import targets, writing

@@ -227,7 +227,7 @@ def _digits(name: str, curve: ForceCurve) -> int:
 def _print_limits(config: Config, K_star: float) -> None:  # noqa: N803
     """Print the stiffnesses above which sliding is stable: K*, and limits of linear theory."""
     from mesoslip.quantities import percent, with_unit
-    from mesoslip.theory.linear_stability import OUT_OF_STEP, shown_by
+    from mesoslip.theory.linear_stability import DEPHASED_WIDTH, shown_by
     from mesoslip.theory.steady_sliding import stiffness_limits
 
     limits = stiffness_limits(config, MAX_WORK)
@@ -236,10 +236,10 @@ def _print_limits(config: Config, K_star: float) -> None:  # noqa: N803
     speed = with_unit(limits.velocity, "m/s", 3)
     rows = [
         (K_star, "slow sliding from this start without delay has no instability (K*)"),
-        (limits.in_step, f"steady sliding at {speed} is linearly stable, with delay"),
+        (limits.in_phase, f"steady sliding at {speed} is linearly stable, with delay"),
         (
-            limits.out_of_step,
-            f"the same for contacts out of step (thresholds of {percent(OUT_OF_STEP)})",
+            limits.dephased,
+            f"the same for dephased contacts (thresholds of {percent(DEPHASED_WIDTH)})",
         ),
     ]
     width = len(LIMITS_HEADER)

@@ -92,7 +92,7 @@ def trace(
     area: Annotated[str | None, _option("Area by which stresses become forces", "25 cm^2")] = None,
     start: Annotated[str | None, _option("Time from which samples are used", "100 s")] = None,
     end: Annotated[str | None, _option("Time until which samples are used", "160 s")] = None,
-    hum: Annotated[str | None, _option("Frequency of a hum to take off", "50 Hz")] = None,
+    hum: Annotated[str | None, _option("Frequency of mains hum to remove", "50 Hz")] = None,
     trend: Annotated[
         str | None,
         typer.Option(

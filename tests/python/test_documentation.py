@@ -50,6 +50,7 @@ LONG_PAGES = [
     "how-to/pictures.md",
     "how-to/slide-hold-slide.md",
     "how-to/which-motion.md",
+    "questions.md",
     "teaching.md",
     "tutorial-fit.md",
     "tutorial.md",
@@ -59,6 +60,7 @@ LONG_PAGES = [
 AS_THEY_STAND = [
     "how-to/measured-surface.md",
     "how-to/slide-hold-slide.md",
+    "questions.md",
     "teaching.md",
     "tutorial-fit.md",
 ]

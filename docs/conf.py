@@ -29,6 +29,7 @@ extensions = [
     "front_page",
     "generated_pages",
     "mathml",
+    "notebooks",
 ]
 exclude_patterns = ["_extensions", "gallery"]
 suppress_warnings = ["config.cache"]

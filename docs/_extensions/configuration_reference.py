@@ -42,7 +42,7 @@ def configuration_page() -> str:
 
 def _tables() -> Iterator[tuple[str, type[Table]]]:
     """Each table with its name in a file, those of a kind of slider one after another."""
-    yield "At the top", Config
+    yield "Top-level keys", Config
     for name, field in Config.fields().items():
         if name == "slider":
             for kind, table in SLIDERS.items():
@@ -77,17 +77,17 @@ def _summary(table: type[Table]) -> str:
 
 def _rows(table: type[Table], title: str) -> Iterator[str]:
     documented = meanings(table)
-    yield "| key | unit | default | takes | meaning |"
+    yield "| key | unit | default | allowed values | meaning |"
     yield "|---|---|---|---|---|"
     for name, field in table.model_fields.items():
         is_of_tables = next(tables_in(field.annotation), None) is not None
-        if title == "At the top" and is_of_tables:
+        if title == "Top-level keys" and is_of_tables:
             continue
         cells = (
             f"`{field.alias or name}`",
             _unit(field),
             _default(field),
-            _table_or_tables(field) if is_of_tables else _takes(field),
+            _table_or_tables(field) if is_of_tables else _allowed(field),
             documented[name],
         )
         yield "| " + " | ".join(cells) + " |"
@@ -174,8 +174,8 @@ def _default(field: FieldInfo) -> str:
     return f'`"{default}"`' if isinstance(default, str) else f"`{default:g}`"
 
 
-def _takes(field: FieldInfo) -> str:
-    """What values a key takes."""
+def _allowed(field: FieldInfo) -> str:
+    """The values that a key allows."""
     bare = _bare(field)
     chosen = _choices(field, bare)
     if chosen:

@@ -19,10 +19,14 @@ INTRODUCTION = """\
 # Fortran library
 
 The kernels are a Fortran library, which Python uses. Modules are named after their path:
-`fortran/sliders/rigid.f90` is `mesoslip_sliders_rigid`. This page has their public entities, from
-the comments of the sources. Procedures that can fail have an allocatable `type(error_type)` as
-their last argument; unallocated means success. The library never stops the program.
+`fortran/sliders/rigid.f90` is `mesoslip_sliders_rigid`. The pages have their public entities, from
+the comments of the sources; the search leaves them out. Procedures that can fail have an
+allocatable `type(error_type)` as their last argument; unallocated means success. The library never stops the
+program.
 """
+
+# Front matter of pages that the search of the documentation leaves out.
+NOT_SEARCHED = "---\nnosearch: true\n---\n"
 
 MODULE = re.compile(r"module (?!procedure)(\w+)")
 TYPE = re.compile(r"type(?:, *[\w() ,]+)? *:: *(\w+)|type +(\w+)$")
@@ -167,8 +171,9 @@ def _add_part(entity: Entity, statement: str, comment: str) -> None:
             entity.parts.append((f"{names} : {declaration}", comment))
 
 
-def fortran_page() -> str:
-    """All modules with what they make public, folder by folder."""
+def fortran_pages() -> dict[str, str]:
+    """Pages by name: an introduction, and all modules with what they make public, of each folder
+    a page."""
     modules = [found for path in sorted(SOURCES.rglob("*.f90")) if (found := read_module(path))]
     types = {
         entity.name: (module, entity)
@@ -176,17 +181,26 @@ def fortran_page() -> str:
         for entity in module.entities.values()
         if entity.kind == "type"
     }
-    parts = [INTRODUCTION]
-    modules.sort(key=lambda one: (str(Path(one.file).parent), one.file))
-    for folder, inside in groupby(modules, key=lambda one: str(Path(one.file).parent)):
-        parts += [f"## {folder}", ""]
+    modules.sort(key=lambda one: (_page_of(one), one.file))
+    pages: dict[str, str] = {}
+    for page, on_page in groupby(modules, key=_page_of):
+        inside = list(on_page)
+        parts = [NOT_SEARCHED, f"# Fortran: {Path(inside[0].file).parent}", ""]
         for module in inside:
             parts += _section(module, types)
-    return "\n".join(parts)
+        pages[page] = "\n".join(parts)
+    links = [f"- [{page}]({page}.md)" for page in pages]
+    contents = "\n".join(["```{toctree}", ":hidden:", "", *pages, "```"])
+    return {"fortran": "\n".join([INTRODUCTION, *links, "", contents, ""]), **pages}
+
+
+def _page_of(module: Module) -> str:
+    """Name of the page of a module, after its folder."""
+    return "-".join(("fortran-library", *Path(module.file).parent.parts[1:]))
 
 
 def _section(module: Module, types: dict[str, tuple[Module, Entity]]) -> list[str]:
-    parts = [f"### {module.name}", "", f"`{module.file}`. {_escaped(module.comment)}", ""]
+    parts = [f"## {module.name}", "", f"`{module.file}`. {_escaped(module.comment)}", ""]
     constants = [name for name in module.public if name in module.constants]
     if constants:
         parts += ["| constant | value | meaning |", "|---|---|---|"]
@@ -227,7 +241,7 @@ def _bound(
     procedure = module.entities.get(target)
     comment = comment or (procedure.comment if procedure else "")
     if base is not None:
-        line = f"- `{name}` (procedure of [{base[1].name}](#{base[0].name}))"
+        line = f"- `{name}` (procedure of [{base[1].name}]({_page_of(base[0])}.md#{base[0].name}))"
         return [f"{line}<br>{_on_a_line(comment)}" if comment else line]
     parts = procedure.parts if procedure else []
     return [_item(f"{name} (procedure)", comment), *("  " + _item(*part) for part in parts)]

@@ -8,7 +8,7 @@ from typing import Any
 import mesoslip
 from command_reference import command_page
 from configuration_reference import configuration_page
-from fortran_reference import fortran_page
+from fortran_reference import fortran_pages
 from output_reference import output_page
 
 # Folder beneath docs, which git ignores.
@@ -17,15 +17,15 @@ PAGES = {
     "configuration": configuration_page,
     "command-line": command_page,
     "output": output_page,
-    "fortran": fortran_page,
 }
 
 
 def write_pages(folder: Path) -> None:
     """Write the pages; those that stay as they are are left alone."""
     folder.mkdir(parents=True, exist_ok=True)
-    for name, page in PAGES.items():
-        path, text = folder / f"{name}.md", page()
+    pages = {name: page() for name, page in PAGES.items()} | fortran_pages()
+    for name, text in pages.items():
+        path = folder / f"{name}.md"
         if not path.exists() or path.read_text() != text:
             path.write_text(text)
 

@@ -116,7 +116,7 @@ GROUPS: tuple[tuple[str, Group, str], ...] = (
         "mesoslip curve of contacts that age or creep: root",
         variables.STEADY,
         "Dimension `velocity`: [steady sliding](../../steady-sliding.md) over velocity; the "
-        "attribute `boundaries` has the velocities at which it turns stable or unstable.",
+        "attribute `boundaries` has the velocities at which it gains or loses stability.",
     ),
     (
         "mesoslip onset: groups sequential and melting",

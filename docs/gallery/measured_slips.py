@@ -3,7 +3,7 @@ Slips in a measurement
 ======================
 
 Paper on paper: a slider of 30.7 g on a spring of 1002 N/m, pulled at 42 µm/s. The trace is
-digitized, and has impulses, which are taken off for the slips and marked here. The file describes
+digitized, and has impulses, which are removed for the slips and marked here. The file describes
 columns, weight, spring and drive; ``mesoslip example measured/paper-k1002-v42`` writes it with
 the data.
 

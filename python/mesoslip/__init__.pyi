@@ -25,9 +25,9 @@ from .inference.fit_trace import fit
 from .inference.predict import compare_fits, predict
 from .measured.trace import read_trace
 from .output.inputs import open_output
+from .output.realization import Realization
 from .plots.plot import plot
 from .reports.report import report
-from .simulation.realization import Realization
 from .theory.contacts.plain_sliding import SteadySliding
 from .theory.curve import curve
 from .theory.derived import derived

@@ -266,7 +266,7 @@ def test_ten_knobs_at_a_width(server, browser, tmp_path, width):
         assert (knob[1] < force[0]) == (width == WIDE)
         assert force[2] > (450 if width == WIDE else 340)
         if width == NARROW:
-            # The picture of the force stays in sight while knobs are turned.
+            # The picture of the force stays visible while knobs are turned.
             browser.driver.execute_script("window.scrollTo(0, 1500)")
             script = "return document.querySelector('.force').getBoundingClientRect().top"
             assert browser.driver.execute_script(script) == pytest.approx(0, abs=1)

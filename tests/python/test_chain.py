@@ -68,7 +68,7 @@ def test_a_chain_is_one_run_with_stages(kind):
         there = whole.trace[first : first + len(one.trace)]
         # At the change of the drive the whole run has a sample of before it.
         np.testing.assert_array_equal(one.trace[1:, MOTION], there[1:, MOTION])
-        (row,) = one.table("stages")
+        (row,) = one.records("stages")
         assert row["stage_start_time"] == 0
         assert row["start_displacement"] == 0
         assert one.trace[0, 0] == 0
@@ -133,7 +133,7 @@ def test_another_spring_bears_the_same_force(ratio):
     )
     _, end = finished(config)
     one, _ = finished(config.replace({"slider.stiffness": springs[1]}), end)
-    trace = one.table("trace")
+    trace = one.records("trace")
     assert trace["spring_force"][0] == pytest.approx(end_force(end.config), rel=1e-12)
     # X, V, W and the spring's stretch, which grows with the drive.
     start = [0.0, trace["velocity"][0], damper_mean(config), trace["spring_force"][0], 1.0]
@@ -154,13 +154,13 @@ def test_another_spring_bears_the_same_force(ratio):
 
 def end_force(config):
     """Spring force at the end of a run from its start."""
-    return finished(config)[0].table("trace")["spring_force"][-1]
+    return finished(config)[0].records("trace")["spring_force"][-1]
 
 
 def damper_mean(config):
     """Running mean of the velocity W at the end of a run: dW/dt = η (V − W)."""
     fine = config.replace({"output.interval": 1e-6})
-    trace = finished(fine)[0].table("trace")
+    trace = finished(fine)[0].records("trace")
     rate = config.slider.oscillator.damping
     from scipy.integrate import simpson
 
@@ -175,7 +175,7 @@ def test_a_sweep_up_and_down(tmp_path):
     whole = Config.from_dict(SHORT | {"drive": drive, "run": SHORT["run"] | {"duration": 2.4}})
     plan = Plan.from_dict(sweep_tables(order="up and down", discard=0.0))
     interval = plan.combinations[0].config.output_interval
-    trace = finished(whole.replace({"output.interval": interval}))[0].table("trace")
+    trace = finished(whole.replace({"output.interval": interval}))[0].records("trace")
     with Store(tmp_path, "points") as store:
         done = run_sweep(plan, store=store)
         assert (done.computed, done.stored) == (6, 0)

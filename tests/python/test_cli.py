@@ -19,6 +19,7 @@ import pytest
 import tomli_w
 import xarray as xr
 from conftest import ROOT, klein_tables, long
+from mesoslip.command_line.main import COMMANDS, GROUPS
 from mesoslip.command_line.progress import say
 
 pytestmark = pytest.mark.usefixtures("quick_pictures")
@@ -91,8 +92,41 @@ def test_info(command):
     status, out, _ = command("info", ROOT / "runs" / "klein.toml", "--json")
     assert status == 0
     assert json.loads(out)["omega_s"] == pytest.approx(256.88, rel=1e-4)
-    status, out, _ = command("info", ROOT / "runs" / "klein.toml", "--set", "slider.mass=1kg")
+    status, out, _ = command(
+        "info", ROOT / "runs" / "klein.toml", "--all", "--set", "slider.mass=1kg"
+    )
     assert "setup frequency" in out
+
+
+def test_info_prints_the_overview_first(short, tmp_path, command):
+    """Force, stiffness, times and breaks; the rest with --all. Sliding steadily, each contact
+    breaks once in its mean life: prescribed motion has as many breaks as are estimated."""
+    options = ("--set", "contacts.delay=0", "--set", "contacts.initial=steady")
+    options += ("--set", "slider.kind=prescribed", "--set", "output.interval=0.1 s")
+    brief, complete = (command("info", short, *options, *more)[1] for more in ((), ("--all",)))
+    names = [line.split()[0] for line in brief.splitlines() if line[:1].isalpha()]
+    assert names == ["static_force", "K_star_estimate", "F_steady_drive", "contact_breaks"]
+    lines = {line.split()[0]: line.split() for line in complete.splitlines()}
+    assert list(lines)[: len(names)] == names
+    assert "mean_life" in lines
+    assert f"{len(json.loads(command('info', short, *options, '--json')[1])) - 2} more" in brief
+    assert "--all" not in complete
+    assert command("run", short, *options, "-o", tmp_path / "steady.nc", "--quiet")[0] == 0
+    counted = mesoslip.open_output(tmp_path / "steady.nc")["breaks"].values.sum()
+    assert float(lines["contact_breaks"][1]) == pytest.approx(counted, rel=0.02)
+
+
+def test_the_help_groups_all_commands_and_cuts_no_description(monkeypatch, command):
+    monkeypatch.setenv("COLUMNS", "80")
+    status, out, _ = command("--help")
+    assert status == 0
+    titles = re.findall(r"^(\w[\w ]*):$", out, re.MULTILINE)
+    assert titles == ["Options", *GROUPS]
+    lines = [line.split() for line in out.partition("Simulate:")[2].splitlines()]
+    listed = {words[0]: " ".join(words[1:]) for words in lines if len(words) > 2}
+    assert listed.keys() == {one.__name__.replace("_", "-") for one in COMMANDS}
+    assert not {name: text for name, text in listed.items() if not re.search(r"[^.]\.$", text)}
+    assert max(map(len, out.splitlines())) <= 80
 
 
 def test_slips(short, tmp_path, command):
@@ -455,7 +489,8 @@ def test_an_ending_that_is_not_reached_is_reported(short, tmp_path, command):
 
 def test_printed_digits_are_those_that_a_number_deserves(short, command):
     """Four of what follows from keys; of a curve as many as its error leaves; two of errors."""
-    lines = {line.split()[0]: line.split() for line in command("info", short)[1].splitlines()}
+    printed = command("info", short, "--all")[1]
+    lines = {line.split()[0]: line.split() for line in printed.splitlines()}
     assert lines["omega_s"][1:3] == ["256.9", "1/s"]
     rough = ("--set", "contacts.threshold.law=uniform")
     status, printed, warning = command("curve", short, *rough)

@@ -58,7 +58,7 @@ def test_cycle_agrees_with_a_long_run(regular):
     with mesoslip.Realization(config, estimates_errors=False) as run:
         while not run.finished:
             run.advance()
-        slips = run.table("slips")[-11:]
+        slips = run.records("slips")[-11:]
     assert regular.motion == "periodic"
     assert regular.multiple == 1
     assert regular.period == pytest.approx(np.mean(np.diff(slips["start_time"])), rel=1e-4)
@@ -84,7 +84,7 @@ def test_contacts_that_break_together():
     with mesoslip.Realization(one_by_one) as run:
         while not run.finished:
             run.advance()
-        slips = run.table("slips")
+        slips = run.records("slips")
     peaks, times = slips["force_before"], slips["start_time"]
     assert len(slips) == 4
     assert found.peak_force == pytest.approx(peaks[-1], rel=1e-3)

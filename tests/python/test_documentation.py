@@ -50,6 +50,7 @@ LONG_PAGES = [
     "how-to/pictures.md",
     "how-to/slide-hold-slide.md",
     "how-to/which-motion.md",
+    "questions.md",
     "teaching.md",
     "tutorial-fit.md",
     "tutorial.md",
@@ -59,6 +60,7 @@ LONG_PAGES = [
 AS_THEY_STAND = [
     "how-to/measured-surface.md",
     "how-to/slide-hold-slide.md",
+    "questions.md",
     "teaching.md",
     "tutorial-fit.md",
 ]
@@ -451,9 +453,14 @@ def test_every_command_and_variable_is_in_the_reference():
 
 @pytest.mark.usefixtures("references")
 def test_the_fortran_reference_has_what_modules_make_public():
-    from fortran_reference import SOURCES, fortran_page, read_module
+    from fortran_reference import SOURCES, fortran_pages, read_module
 
-    page = fortran_page()
+    pages = fortran_pages()
+    page = "\n".join(pages.values())
+    linked = re.findall(r"\]\(([\w-]+)\.md(?:#(\w+))?\)", page)
+    assert len(linked) > 20
+    for name, anchor in linked:
+        assert not anchor or f"\n## {anchor}\n" in pages[name]
     for path in SOURCES.rglob("*.f90"):
         module = read_module(path)
         if module is None:
@@ -493,6 +500,15 @@ def test_every_page_has_a_place_in_the_list_on_the_left():
     listed = {str(path.relative_to(DOCS)) for entry in entries for path in DOCS.glob(f"{entry}.md")}
     pages = {str(path.relative_to(DOCS)) for path in PAGES if DOCS in path.parents}
     assert pages - {"index.md"} == {one for one in listed if "generated" not in one}
+
+
+def test_every_function_is_on_a_page_of_the_reference():
+    pages = [path.read_text() for path in (DOCS / "reference").glob("python*.md")]
+    found = set(re.findall(r"^\.\. auto\w+:: ([\w.]+)$", "\n".join(pages), re.MULTILINE))
+    listed = set(re.findall(r"`(\w+)`", (DOCS / "reference" / "python.md").read_text()))
+    names = {name.rpartition(".")[2] for name in found}
+    assert {*mesoslip.__all__} <= names
+    assert names <= {*listed, "MesoslipError", "ConfigError", "FileError", "RunError"}
 
 
 def test_metadata_agree():

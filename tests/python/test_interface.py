@@ -91,7 +91,7 @@ def test_a_plain_code_with_the_same_contacts_moves_alike(blocks, duration, slide
         neighbour_damping=own.neighbour_damping,
         damping=own.damping_rate,
     )
-    trace, places = one.table("trace"), one.rows("blocks").read()[:, :blocks]
+    trace, places = one.records("trace"), one.rows("blocks").read()[:, :blocks]
     for sample, expected in zip(trace, places, strict=True):
         plain.advance(float(sample["time"]), 0.005)
         # The plain code's error, which falls with the fourth power of its step.
@@ -110,7 +110,7 @@ def pinned(blocks: int, duration: float, contact: float, **slider: Any) -> dict[
 def places_of(one: Realization) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Times, and displacements and velocities of blocks, shape (2, times, blocks)."""
     rows, blocks = one.rows("blocks").read(), one.config.slider.block_count
-    return one.table("trace")["time"], np.array([rows[:, :blocks], rows[:, blocks : 2 * blocks]])
+    return one.records("trace")["time"], np.array([rows[:, :blocks], rows[:, blocks : 2 * blocks]])
 
 
 def test_the_pinned_row_has_the_dispersion_of_a_chain():
@@ -206,7 +206,7 @@ def test_one_block_is_the_rigid_slider(loading):
     rigid = finished(tables)
     assert one.breaks == rigid.breaks > 30
     for name in ("displacement", "spring_force", "contact_force"):
-        mine, theirs = one.table("trace")[name], rigid.table("trace")[name]
+        mine, theirs = one.records("trace")[name], rigid.records("trace")[name]
         np.testing.assert_allclose(mine, theirs, atol=1e-10 * abs(theirs).max())
     np.testing.assert_allclose(one.slips[:, :2], rigid.slips[:, :2], rtol=1e-4)
 
@@ -258,7 +258,7 @@ def test_blocks_that_detach_into_a_large_drag_move_exactly(drag):
     tables["slider"] = {"kind": "rigid", "mass": BLOCK_MASS, "stiffness": 40.0, "damping": 0.2}
     rigid = finished(tables)
     assert one.breaks == rigid.breaks > 5
-    mine, theirs = one.table("trace")["contact_force"], rigid.table("trace")["contact_force"]
+    mine, theirs = one.records("trace")["contact_force"], rigid.records("trace")["contact_force"]
     np.testing.assert_allclose(mine, theirs, atol=1e-9 * abs(theirs).max())
     several = row(3, 12.0, damping=0.2)
     several["contacts"]["drag"] = 3 * drag
@@ -276,7 +276,7 @@ def test_alike_contacts_under_springs_from_above_are_a_rigid_slider():
     rigid = finished(tables)
     places = places_of(blocks)[1][0]
     assert np.ptp(places, axis=1).max() < 1e-9
-    mine, theirs = blocks.table("trace")["spring_force"], rigid.table("trace")["spring_force"]
+    mine, theirs = blocks.records("trace")["spring_force"], rigid.records("trace")["spring_force"]
     # Each block has steps of its own, to the accuracy of the master equation.
     assert theirs.max() > 100
     np.testing.assert_allclose(mine, theirs, atol=5e-4 * theirs.max())

@@ -75,7 +75,7 @@ def test_a_displaced_drive_pulls_with_its_spring(kind, changes):
         with run.twin(1e-9) as other:
             for one in (run, other):
                 one.advance_to(0.5)
-            before, after = run.table("trace")[-1], other.table("trace")[-1]
+            before, after = run.records("trace")[-1], other.records("trace")[-1]
             shift = after["drive_displacement"] - before["drive_displacement"]
             assert shift == pytest.approx(1e-9, rel=1e-4)
             # Pinned contacts and the spring share it.

@@ -218,7 +218,7 @@ def test_the_response_of_a_trace_of_coefficients(tmp_path, command, monkeypatch)
     assert found["rate_and_state"]["a_coefficient"].attrs["units"] == "1"
     assert found["rate_and_state"]["stiffness"].attrs["units"] == "m-1"
     assert "a" not in found["rate_and_state"].data_vars
-    # The trend is taken off: a - b of the steady friction is that of the law.
+    # The trend is removed: a - b of the steady friction is that of the law.
     step = rows_of(found, "steps")[0]
     difference = step["rate_dependence_coefficient"] - (LAW.a - LAW.b)
     assert abs(difference) < 3 * step["rate_dependence_coefficient_error"] + 5e-5

@@ -53,7 +53,7 @@ def finished(config, **options):
     with Realization(config, estimates_errors=False, **options) as one:
         while not one.finished:
             one.advance()
-        return one, one.table("trace")
+        return one, one.records("trace")
 
 
 def trace(config, number=0):
@@ -184,7 +184,7 @@ def test_touching_contacts_bear_nothing():
     with Realization(config) as one:
         one.advance_to(1500.0)
         contacts = one.contacts
-        there, force = one.displacement, one.table("trace")["spring_force"][-1]
+        there, force = one.displacement, one.records("trace")["spring_force"][-1]
         stretch = there - contacts["origin"][contacts["stiffness"] > 0]
     assert len(stretch) == 6000
     assert force == pytest.approx(STEADY, abs=0.02)

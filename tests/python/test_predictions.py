@@ -23,8 +23,8 @@ def measured(name, **changes):
 def test_growth_is_that_of_steady_sliding(delay, klein):
     sliding = mesoslip.SteadySliding(klein(**SHORT, contacts__delay=delay))
     assert measured("growth_rate", contacts__delay=delay) == sliding.growth_rate
-    stable = measured("stable_out_of_step", contacts__delay=delay)
-    assert stable == sliding.is_stable_out_of_step
+    stable = measured("stable_dephased", contacts__delay=delay)
+    assert stable == sliding.is_stable_dephased
     # Where Klein's case slides smoothly in the end, and where it slips.
     assert stable == (delay < 1e-3)
 

@@ -41,14 +41,14 @@ def test_it_comes_to_a_time_and_no_farther_than_the_next_event(klein, whole):
         assert one.finished
         assert one.time == config.duration
         for table in ("trace", "slips", "slip_trace", "stages"):
-            np.testing.assert_array_equal(one.table(table), whole.table(table))
+            np.testing.assert_array_equal(one.records(table), whole.records(table))
         assert one.energy_terms == whole.energy_terms
     assert not one.is_open
 
 
 @pytest.mark.parametrize("name", [name for name, columns in COLUMNS.items() if columns])
 def test_tables_have_the_columns_of_the_kernel(whole, name):
-    table = whole.table(name)
+    table = whole.records(name)
     assert table.dtype.names == COLUMNS[name]
     rows = whole.rows(name).read()
     for number, column in enumerate(COLUMNS[name]):
@@ -56,7 +56,7 @@ def test_tables_have_the_columns_of_the_kernel(whole, name):
 
 
 def test_columns_are_what_their_names_say(whole):
-    trace, slips = whole.table("trace"), whole.table("slips")
+    trace, slips = whole.records("trace"), whole.records("slips")
     assert np.all(np.diff(trace["time"]) > 0)
     spring = whole.config.spring_stiffness * (trace["drive_displacement"] - trace["displacement"])
     np.testing.assert_allclose(trace["spring_force"], spring, rtol=1e-9, atol=1e-18)
@@ -65,10 +65,33 @@ def test_columns_are_what_their_names_say(whole):
     assert np.all(slips["force_after"] < slips["force_before"])
 
 
+@pytest.mark.parametrize("name", [name for name, columns in COLUMNS.items() if columns])
+def test_tables_are_datasets_with_units(whole, name):
+    table, records = whole.table(name), whole.records(name)
+    assert set(table.variables) == set(COLUMNS[name])
+    assert len(table.dims) == 1
+    for column, variable in table.variables.items():
+        assert variable.attrs["long_name"]
+        assert variable.attrs["units"], column
+        np.testing.assert_array_equal(variable, records[column])
+    if name == "trace":
+        assert table["spring_force"].attrs["units"] == "N"
+        assert float(table["displacement"].sel(time=1.0, method="nearest")) > 0
+
+
+def test_counts_of_the_master_equation_are_real():
+    tables = klein_tables(**SHORT, run__engine="me", contacts__initial="steady")
+    with Realization(Config.from_dict(tables), estimates_errors=False) as one:
+        one.advance_to(0.5)
+        detached = one.table("trace")["detached_contacts"]
+    assert detached.dtype == np.float64
+    assert np.any(detached % 1 > 0)
+
+
 @pytest.mark.parametrize("name", ["layers", "snapshots", "colours"])
 def test_tables_without_named_columns_are_errors(whole, name):
     with pytest.raises(RunError, match="there are 'trace', "):
-        whole.table(name)
+        whole.records(name)
 
 
 def test_the_example_of_its_documentation_runs(tmp_path, monkeypatch):

@@ -50,7 +50,7 @@ def test_without_temperature_stability_is_that_of_contacts_without(klein, ageing
         assert found.leading_root == pytest.approx(expected.leading_root, rel=1e-6)
         assert found.force == pytest.approx(expected.force, rel=1e-6)
         assert found.slope == pytest.approx(expected.slope, rel=1e-5)
-    assert found.is_stable_out_of_step == expected.is_stable_out_of_step
+    assert found.is_stable_dephased == expected.is_stable_dephased
     if ageing is None:
         assert found.critical_stiffness == pytest.approx(expected.critical_stiffness, rel=1e-4)
 

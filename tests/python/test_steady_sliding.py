@@ -220,14 +220,14 @@ def test_boundary_is_where_growth_begins(klein):
 
 def test_stiffer_springs_than_one_make_sliding_stable(klein, tmp_path, command):
     config = klein()
-    found, most = stable_stiffness(config), stable_stiffness(config, out_of_step=True)
+    found, most = stable_stiffness(config), stable_stiffness(config, dephased=True)
     # K* is far above, and the spring of the experiment below.
     assert 97 < most < found < ForceCurve(config).K_star[0] / 10
     for factor, is_stable in ((0.99, False), (1.01, True), (8, True)):
         sliding = SteadySliding(config.replace({"slider.stiffness": factor * found}))
         assert sliding.is_stable == is_stable
         sliding = SteadySliding(config.replace({"slider.stiffness": factor * most}))
-        assert sliding.is_stable_out_of_step == is_stable
+        assert sliding.is_stable_dephased == is_stable
     assert stable_stiffness(klein(contacts__delay=0.0)) is None
     # So long a delay feeds oscillations of the stiffest spring.
     long = klein(contacts__delay=1e-2)
@@ -238,7 +238,7 @@ def test_stiffer_springs_than_one_make_sliding_stable(klein, tmp_path, command):
     file.write_text(config.to_toml())
     printed = command("curve", file)[1]
     assert f"{with_unit(found, 'N/m', 3)}  steady sliding at 100 nm/s is linearly" in printed
-    assert f"{with_unit(most, 'N/m', 3)}  the same for contacts out of step" in printed
+    assert f"{with_unit(most, 'N/m', 3)}  the same for dephased contacts" in printed
     assert "spring stiffer than" not in command("curve", file, "--set", "contacts.delay=0")[1]
 
 
@@ -267,11 +267,11 @@ def test_info_and_curve_report_steady_sliding(klein, tmp_path, command):
         assert "delay" in printed
         assert "inertia decide whether slips" in printed
         assert "is linearly unstable, with delay" in printed
-        assert "but not for contacts out of step" in printed
+        assert "but not for dephased contacts" in printed
         assert "no amplitude: only a run or mesoslip cycle shows it" in printed
     for velocity in ("1e-7", "3e-6"):
         printed = command("info", file, "--set", f"drive.velocity={velocity}")[1]
-        assert "also for contacts out of step" in printed
+        assert "also for dephased contacts" in printed
     # Where `mesoslip cycle` refuses the configuration, or leaves something out.
     for change in ("contacts.reattach=false", "slider.kind=layered", "interaction.strength=0.1"):
         changes = ["slider.layers=2"] if "layered" in change else []

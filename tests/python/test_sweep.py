@@ -45,7 +45,7 @@ GRID = {
 # Measures of what theory says.
 PREDICTED = {
     "growth_rate",
-    "stable_out_of_step",
+    "stable_dephased",
     "critical_stiffness_ratio",
     "waiting_over_damping",
 }

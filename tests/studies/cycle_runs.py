@@ -56,7 +56,7 @@ def run(config: mesoslip.Config, duration: float) -> np.ndarray:
     with mesoslip.Realization(config.replace(changes), estimates_errors=False) as one:
         while not one.finished:
             one.advance()
-        slips = one.table("slips")
+        slips = one.records("slips")
         return np.array([slips["start_time"], slips["force_before"]])
 
 

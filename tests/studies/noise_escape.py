@@ -57,7 +57,7 @@ def waiting_time(config: Config) -> tuple[float, bool]:
     with mesoslip.Realization(config) as run:
         while not run.finished:
             run.advance(ADVANCES)
-            slips = run.table("slips")
+            slips = run.records("slips")
             drops = slips["force_before"] - slips["force_after"]
             large = np.flatnonzero(drops > MIN_DROP * config.contacts.static_force)
             if large.size:

@@ -19,7 +19,7 @@ from typing import Any
 import mesoslip
 import numpy as np
 from mesoslip import Config, SteadySliding
-from mesoslip.theory.linear_stability import OUT_OF_STEP
+from mesoslip.theory.linear_stability import DEPHASED_WIDTH
 from mesoslip.theory.steady_sliding import sliding_of
 from numpy.typing import NDArray
 
@@ -270,7 +270,7 @@ def draw_map(file: str) -> None:
 
     figure, axes = plt.subplots(1, len(VELOCITIES), figsize=(12, 5), layout="constrained")
     for velocity, panel in zip(VELOCITIES, axes, strict=True):
-        for width, style in ((WIDTH, "solid"), (OUT_OF_STEP, "dashed")):
+        for width, style in ((WIDTH, "solid"), (DEPHASED_WIDTH, "dashed")):
             growth = np.array(
                 [
                     [
@@ -301,11 +301,11 @@ def draw_map(file: str) -> None:
                 regime = int(data["regime"][0])
                 sliding = SteadySliding(config)
                 stable = "stable" if sliding.is_stable else "unstable"
-                if sliding.is_stable != sliding.is_stable_out_of_step:
-                    stable += " in step only"
+                if sliding.is_stable != sliding.is_stable_dephased:
+                    stable += " in phase only"
                 name = data["regime"].attrs["flag_meanings"].split()[regime]
                 printed[stable, name] = printed.get((stable, name), 0) + 1
-                if sliding.is_stable_out_of_step == (regime in {1, 2}):
+                if sliding.is_stable_dephased == (regime in {1, 2}):
                     print(
                         f"{1e6 * velocity:g} um/s, {1e3 * delay:.3g} ms, {stiffness:.3g} N/m: "
                         f"{stable}, {name}, "
@@ -325,7 +325,7 @@ def draw_map(file: str) -> None:
         panel.set(xlabel="delay, ms", ylabel="stiffness K, N/m", title=f"{1e6 * velocity:g} µm/s")
     for number, name in enumerate(("smooth", "stick-slip", "irregular", "transient")):
         axes[0].plot([], [], MARKERS[number], color=COLOURS[number], label=name)
-    axes[0].plot([], [], "--", color="tab:red", label="the same out of step")
+    axes[0].plot([], [], "--", color="tab:red", label="the same, dephased")
     axes[0].fill_between([], [], color="tab:red", alpha=0.15, label="steady sliding unstable")
     figure.legend(loc="outside lower center", ncols=6)
     figure.savefig(file, dpi=110)

@@ -235,7 +235,7 @@ def lyapunov(
                 progress(0.5 * run.time / end)
         run.advance_to(end)
         reference = Orbit.of_trace(run.trace, checked)
-        peaks = run.table("slips")
+        peaks = run.records("slips")
     _advance_all(others, span, executor, progress)
     results = []
     for other, start in others:

@@ -308,7 +308,7 @@ def mean_field(config: ConfigLike, *, progress: Callable[[float], None] | None =
     for number in range(count):
         with Realization(sliding, number) as one:
             parts.append(_lives(one, progress, number, count))
-            trace = one.table("trace")
+            trace = one.records("trace")
         start = SETTLED * checked.contacts.break_stretch
         forces.append(trace["contact_force"][trace["displacement"] > start].mean())
     lives = ContactLives.joined([one.columns for one in parts])

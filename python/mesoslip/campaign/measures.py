@@ -250,8 +250,8 @@ def growth_rate(run: RunView) -> float:
 @measure(
     "1", "whether steady sliding is stable, including perturbations that desynchronize contacts"
 )
-def stable_out_of_step(run: RunView) -> float:
-    return predictions.stable_out_of_step(run.tree)
+def stable_dephased(run: RunView) -> float:
+    return predictions.stable_dephased(run.tree)
 
 
 @measure("1", "K* of the master equation over the stiffness of the spring")

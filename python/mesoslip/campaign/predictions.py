@@ -40,11 +40,11 @@ def growth_rate(tree: xr.DataTree) -> float:
     return math.nan if sliding is None else sliding.growth_rate
 
 
-def stable_out_of_step(tree: xr.DataTree) -> float:
-    """Whether steady sliding is stable, 1 or 0, if contacts do not break in step either."""
+def stable_dephased(tree: xr.DataTree) -> float:
+    """Whether steady sliding is stable, 1 or 0, of dephased contacts too."""
     sliding = _steady_sliding(tree)
     try:
-        return math.nan if sliding is None else float(sliding.is_stable_out_of_step)
+        return math.nan if sliding is None else float(sliding.is_stable_dephased)
     except RunError:
         return math.nan
 

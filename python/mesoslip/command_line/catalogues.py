@@ -108,7 +108,7 @@ def avalanches(
         ),
     ] = None,
 ) -> None:
-    """Print the sizes of avalanches: their distribution, and the fitted power law."""
+    """Print the sizes of avalanches, and the fitted power law."""
     from mesoslip.analysis import avalanches as avalanche_catalogue
     from mesoslip.analysis.avalanche_sizes import ccdf, logarithmic_bins
     from mesoslip.output import files, targets
@@ -151,7 +151,7 @@ def avalanches(
 
 
 def regime(output: OutputArgument, as_json: JsonOption = False) -> None:
-    """Print the regime of motion: smooth, stick-slip, irregular or transient."""
+    """Print the regime: smooth, stick-slip, irregular or transient."""
     from mesoslip.analysis.regime import NAMES, REGIME, judge, summary
     from mesoslip.output import files
 

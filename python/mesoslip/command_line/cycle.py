@@ -64,7 +64,10 @@ def cycle(
     as_json: JsonOption = False,
     quiet: QuietOption = False,
 ) -> None:
-    """Compute the settled cycle of the master equation, and which motions are possible."""
+    """Compute the settled cycle of the master equation.
+
+    The result says which motions are possible, and whether they are stable.
+    """
     from mesoslip.cycles.cycle import cycle as settled_cycle
     from mesoslip.output import targets, writing
 

@@ -49,7 +49,10 @@ def events(
         ),
     ] = None,
 ) -> None:
-    """Print the b-value and Omori's decay of events, and acoustic emission beside slips."""
+    """Print b-value and Omori decay of events, and acoustic emission.
+
+    Acoustic emission is compared with the slips of a trace.
+    """
     from mesoslip.analysis import events as analysis
     from mesoslip.output import files, targets
     from mesoslip.output.table_files import latex

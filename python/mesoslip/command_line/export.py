@@ -19,7 +19,7 @@ def export(
         ),
     ],
 ) -> None:
-    """Write an output in the format of another program: Zarr, or slips as QuakeML."""
+    """Write an output as Zarr, or its slips as QuakeML."""
     from mesoslip.analysis.export import export as write
 
     write(output, file)

@@ -68,11 +68,11 @@ def fit(
     quiet: QuietOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Fit parameters of the model to traces of one interface, with their uncertainty.
+    """Fit parameters to measured traces, with their uncertainty.
 
-    Of several traces each has its own drive and spring, and all have the free parameters.
-    Simulations are stored beside the posterior, in NAME.simulations, until the fit is done. After
-    an interruption the same command continues.
+    The traces are of one interface. Of several traces each has its own drive and spring, and all
+    have the free parameters. Simulations are stored beside the posterior, in NAME.simulations,
+    until the fit is done. After an interruption the same command continues.
     """
     if compare:
         _print_scores(outputs, as_json=as_json)

@@ -27,7 +27,7 @@ def fronts(
         bool, typer.Option("--latex", help="Print the statistics by kind as a LaTeX table")
     ] = False,
 ) -> None:
-    """Print fronts and precursors of an interface with a length, with statistics."""
+    """Print fronts and precursors of an interface with a length."""
     from mesoslip.analysis.fronts import fronts_of
     from mesoslip.output import files, targets
     from mesoslip.output.table_files import latex

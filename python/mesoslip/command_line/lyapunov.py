@@ -34,7 +34,7 @@ def lyapunov(
     as_json: JsonOption = False,
     quiet: QuietOption = False,
 ) -> None:
-    """Estimate the largest Lyapunov exponent: whether an irregular motion is chaos.
+    """Estimate the largest Lyapunov exponent, the mark of chaos.
 
     Twins of the run start a small distance away, with the same random numbers.
     """

@@ -15,6 +15,7 @@ from mmap import mmap
 from typing import Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
 from mesoslip.array_packages import import_xarray
 from mesoslip.command_line import (
@@ -42,31 +43,25 @@ from mesoslip.errors import MesoslipError
 from mesoslip.memory_limit import RESERVE, is_memory_short, spare_memory
 from mesoslip.output.provenance import COMMAND_LINE
 
-COMMANDS = (
-    run.run,
-    sweep.sweep,
-    theory.info,
-    theory.curve,
-    theory.onset,
-    cycle.cycle,
-    lyapunov.lyapunov,
-    mean_field.mean_field,
-    trace.trace,
-    fit.fit,
-    catalogues.slips,
-    catalogues.avalanches,
-    catalogues.regime,
-    events.events,
-    response.response,
-    strokes.strokes,
-    plateaus.plateaus,
-    fronts.fronts,
-    pictures.plot,
-    report.report,
-    export.export,
-    explore.explore,
-    example.example,
-)
+# Commands in the order and the groups of the help.
+GROUPS = {
+    "Simulate": (run.run, explore.explore, example.example),
+    "Measure": (
+        trace.trace,
+        catalogues.slips,
+        catalogues.regime,
+        catalogues.avalanches,
+        events.events,
+        response.response,
+        strokes.strokes,
+        plateaus.plateaus,
+        fronts.fronts,
+    ),
+    "Theory": (theory.info, theory.curve, theory.onset, cycle.cycle),
+    "Many runs": (sweep.sweep, fit.fit, lyapunov.lyapunov, mean_field.mean_field),
+    "Show": (pictures.plot, report.report, export.export),
+}
+COMMANDS = tuple(command for group in GROUPS.values() for command in group)
 
 # Commands that import xarray only for outputs that need it.
 WITHOUT_XARRAY = {
@@ -122,10 +117,33 @@ def _with_numpy_only(command: Callable[..., None]) -> Callable[..., None]:
     return run
 
 
+class GroupedHelp(TyperGroup):
+    """The command line, whose help lists its commands in groups and cuts no description."""
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:  # noqa: ARG002
+        width = max(map(len, self.commands))
+        for title, group in GROUPS.items():
+            names = [_name(one) for one in group]
+            rows = [
+                (name.ljust(width), self.commands[name].get_short_help_str(sys.maxsize))
+                for name in names
+                if name in self.commands
+            ]
+            if rows:
+                with formatter.section(title):
+                    formatter.write_dl(rows)
+
+
+def _name(command: Callable[..., None]) -> str:
+    """A command as it is typed."""
+    return command.__name__.replace("_", "-")
+
+
 def application(commands: Iterable[Callable[..., None]]) -> typer.Typer:
     """The command line with some of its commands."""
     made = typer.Typer(
         name="mesoslip",
+        cls=GroupedHelp,
         help="Stick-slip friction of a multicontact interface.",
         add_completion=False,
         no_args_is_help=True,
@@ -146,7 +164,7 @@ app = application(COMMANDS)
 
 def _asked(arguments: Sequence[str]) -> typer.Typer:
     """The command line with only the command that is asked for, which is quicker to build."""
-    named = [one for one in COMMANDS if one.__name__.replace("_", "-") in arguments[:1]]
+    named = [one for one in COMMANDS if _name(one) in arguments[:1]]
     return application(named) if named else app
 
 

@@ -35,7 +35,10 @@ def mean_field(
     changes: SetOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Measure where contacts of a lattice break and attach, for the master equation."""
+    """Measure the mean field of a lattice, for the master equation.
+
+    It is given by the stretches at which contacts break and attach.
+    """
     from mesoslip.campaign.mean_field import FIRST, STEADY
     from mesoslip.campaign.mean_field import mean_field as measure
     from mesoslip.errors import FileError

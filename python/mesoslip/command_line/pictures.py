@@ -114,7 +114,7 @@ def plot(
     style: Annotated[
         Path | None,
         typer.Option(
-            help="Style file of matplotlib (.mplstyle), laid over that of mesoslip", metavar="FILE"
+            help="Style file of matplotlib (.mplstyle), on top of that of mesoslip", metavar="FILE"
         ),
     ] = None,
 ) -> None:

@@ -39,7 +39,10 @@ def plateaus(
         ),
     ] = None,
 ) -> None:
-    """Print the friction of each plateau of a record, between steps of speed, load or force."""
+    """Print the friction of each plateau of a record.
+
+    Plateaus lie between steps of speed, load or force.
+    """
     from mesoslip.analysis import plateaus as analysis
     from mesoslip.output import files, targets
     from mesoslip.output.table_files import latex

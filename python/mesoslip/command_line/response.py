@@ -44,7 +44,7 @@ def response(
         bool, typer.Option("--markdown", help="Print rate-and-state parameters as a Markdown table")
     ] = False,
 ) -> None:
-    """Print steady forces, velocity steps, holds, and rate-and-state parameters."""
+    """Print velocity steps, holds, steady forces, rate and state."""
     from mesoslip.analysis.response import (
         force_scale,
         response_arrays,

@@ -39,7 +39,10 @@ def strokes(
         ),
     ] = None,
 ) -> None:
-    """Print strokes and cycles of a record that goes back and forth, or revolutions of a disc."""
+    """Print strokes, cycles and revolutions of a reciprocating record.
+
+    The record goes back and forth, or is that of a disc.
+    """
     from mesoslip.analysis import strokes as analysis
     from mesoslip.output import files, targets
     from mesoslip.output.table_files import latex

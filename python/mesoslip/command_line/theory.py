@@ -37,17 +37,32 @@ LIMITS_HEADER = "spring stiffer than"
 MAX_WORK = 400_000
 
 
-def info(config: ConfigArgument, changes: SetOption = None, as_json: JsonOption = False) -> None:
-    """Print derived quantities, and the predicted stability."""
-    from mesoslip.theory.derived import derived, verdict
+def info(
+    config: ConfigArgument,
+    changes: SetOption = None,
+    is_complete: Annotated[
+        bool, typer.Option("--all", help="Print all derived quantities")
+    ] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Print the predicted motion, and derived quantities.
+
+    Without --all only the first few quantities are printed; JSON has all that are derived.
+    """
+    from mesoslip.theory.derived import derived, overview, verdict
 
     checked = load(config, changes)
     quantities = derived(checked)
     if as_json:
         print_json({name: one.value for name, one in quantities.items()})
         return
-    for name, one in quantities.items():
+    first = overview(checked, quantities)
+    shown = first | quantities if is_complete else first
+    for name, one in shown.items():
         show(name, one.value, one.unit, one.meaning, digits=DERIVED_DIGITS)
+    remaining = len(quantities.keys() - shown.keys())
+    if remaining:
+        typer.echo(f"{remaining} more quantities: --all")
     for message in (
         verdict(checked),
         checked.unreached_drive,
@@ -212,7 +227,7 @@ def _digits(name: str, curve: ForceCurve) -> int:
 def _print_limits(config: Config, K_star: float) -> None:  # noqa: N803
     """Print the stiffnesses above which sliding is stable: K*, and limits of linear theory."""
     from mesoslip.quantities import percent, with_unit
-    from mesoslip.theory.linear_stability import OUT_OF_STEP, shown_by
+    from mesoslip.theory.linear_stability import DEPHASED_WIDTH, shown_by
     from mesoslip.theory.steady_sliding import stiffness_limits
 
     limits = stiffness_limits(config, MAX_WORK)
@@ -221,10 +236,10 @@ def _print_limits(config: Config, K_star: float) -> None:  # noqa: N803
     speed = with_unit(limits.velocity, "m/s", 3)
     rows = [
         (K_star, "slow sliding from this start without delay has no instability (K*)"),
-        (limits.in_step, f"steady sliding at {speed} is linearly stable, with delay"),
+        (limits.in_phase, f"steady sliding at {speed} is linearly stable, with delay"),
         (
-            limits.out_of_step,
-            f"the same for contacts out of step (thresholds of {percent(OUT_OF_STEP)})",
+            limits.dephased,
+            f"the same for dephased contacts (thresholds of {percent(DEPHASED_WIDTH)})",
         ),
     ]
     width = len(LIMITS_HEADER)

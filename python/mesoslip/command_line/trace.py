@@ -92,7 +92,7 @@ def trace(
     area: Annotated[str | None, _option("Area by which stresses become forces", "25 cm^2")] = None,
     start: Annotated[str | None, _option("Time from which samples are used", "100 s")] = None,
     end: Annotated[str | None, _option("Time until which samples are used", "160 s")] = None,
-    hum: Annotated[str | None, _option("Frequency of a hum to take off", "50 Hz")] = None,
+    hum: Annotated[str | None, _option("Frequency of mains hum to remove", "50 Hz")] = None,
     trend: Annotated[
         str | None,
         typer.Option(
@@ -132,7 +132,10 @@ def trace(
         bool, typer.Option("--verbose", help="Print each sampling rate, with its noise")
     ] = False,
 ) -> None:
-    """Read a measured trace as the laboratory wrote it, and write an output like that of a run."""
+    """Read a measured trace, and write it as an output.
+
+    The file is read as the laboratory wrote it; the output is like that of a run.
+    """
     from mesoslip.measured.batch import output_name
     from mesoslip.measured.trace import trace_of, understand
     from mesoslip.output import targets, writing

@@ -109,7 +109,7 @@ def cleaned(
             found.digital_step,
             uncertainty,
         )
-    taken = tuple(one for one in found.sentences() if "taken off" in one)
+    taken = tuple(one for one in found.sentences() if "removed" in one)
     return clean, noise, taken
 
 

@@ -57,8 +57,8 @@ class Boundary(NamedTuple):
 
 
 BOUNDARIES = (
-    Boundary("growth_rate", 0.0, "-.", "steady sliding turns linearly unstable"),
-    Boundary("stable_out_of_step", 0.5, "-", "the same, contacts out of step", is_smooth=False),
+    Boundary("growth_rate", 0.0, "-.", "steady sliding loses linear stability"),
+    Boundary("stable_dephased", 0.5, "-", "the same, dephased contacts", is_smooth=False),
     Boundary("critical_stiffness_ratio", 1.0, "--", "$K = K^*$", is_positive=True),
     Boundary("waiting_over_damping", 1.0, ":", r"$\tau_{ss} \eta_S = 1$", is_positive=True),
 )

@@ -37,7 +37,7 @@ def draw_marks(
     marks = [(*starts, "v", "start of a slip", RED), (*ends, "^", "end of a slip", BLUE)]
     if "noise" in tree.children and "impulse_time" in tree.children["noise"]:
         at = group_of(tree, "noise")["impulse_time"].values
-        marks.append((at, np.interp(at, time, force), "x", "impulse, taken off", YELLOW))
+        marks.append((at, np.interp(at, time, force), "x", "impulse, removed", YELLOW))
     found = False
     for at, level, marker, label, color in marks:
         shown = (at >= window[0]) & (at <= window[1])

@@ -77,69 +77,8 @@ class Saved:
 
 
 class Realization(Recorded):
-    """One run of a configuration, advanced step by step.
-
-    Its results do not depend on how far it advances at a time. Recorded rows stay in memory. The
-    memory of the kernel is freed by `close`, at the end of a ``with`` block, or with this object.
-    Realizations are independent of each other and release the interpreter's lock while they
-    advance, so several can run in threads; each is to be used by one thread at a time.
-
-    Parameters
-    ----------
-    config
-        The configuration.
-    number
-        Number of the realization, from 0; each has its own random numbers.
-    estimates_errors
-        Whether a run of the master equation is repeated with steps twice as long, which estimates
-        the errors due to its steps.
-    coarsening
-        Length of steps relative to the configured one, where there are steps.
-    after
-        The end of another run, which this one continues, see `end`; its errors are then not
-        estimated, and its time and displacement start at 0. By default the run starts with
-        ``contacts.initial``.
-
-    Raises
-    ------
-    RunError
-        By the methods, if the motion makes no progress or a solver fails.
-
-    Examples
-    --------
-    >>> import mesoslip
-    >>> path, *_ = mesoslip.example("klein")  # writes klein.toml
-    >>> config = mesoslip.Config.load(path, overrides=["contacts.count=200"])
-    >>> with mesoslip.Realization(config) as one:
-    ...     one.advance_to(1.0)
-    ...     force = one.table("trace")["spring_force"]
-    ...     stretched = one.contacts["break_stretch"]
-    >>> one.time >= 1.0, one.finished, len(stretched)
-    (True, False, 200)
-
-    Attributes
-    ----------
-    config, number
-        The configuration, and the number of the realization, from 0.
-    time, displacement
-        Time reached [s], and displacement of the slider [m].
-    ending
-        The reason why the run is over; empty before.
-    breaks, detached, advances
-        Breaks so far, number of detached contacts, advances of the slider so far.
-    kernel_seconds
-        Computing time [s].
-    avalanche_count, avalanche_slip
-        Avalanches so far, and the displacement of the slider in them [m].
-    force_error
-        Estimated error of the contact force [N], before the first slip if there is one; 0 where
-        contacts are kept one by one, NaN before it is known.
-    slip_time_error
-        Estimated error of the time at which a slip starts [s], maximum over the slips; 0 or NaN as
-        ``force_error``.
-    integrator_counts
-        Steps, evaluations and failed steps of the slider's integrator, if it has one.
-    """
+    """One run of a configuration, advanced step by step; `mesoslip.Realization` is this class with
+    tables that have units, and describes its parameters and attributes."""
 
     # A run may have 10⁵ of them.
     __slots__ = (
@@ -350,7 +289,7 @@ class Realization(Recorded):
             (`rigid`, `layered`).
         """
         saved = self.save()
-        other = Realization(self.config, self.number, estimates_errors=False)
+        other = type(self)(self.config, self.number, estimates_errors=False)
         other._start = self._start
         other.restore(saved, {name: Rows(rows.columns) for name, rows in self.waiting})
         other._open().displace_drive(distance)

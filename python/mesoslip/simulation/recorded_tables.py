@@ -267,26 +267,9 @@ class Recorded:
             return SnapshotRows(rows)
         return rows
 
-    def table(self, name: str) -> NDArray[np.void]:
-        """Rows recorded in a table up to now, as a structured array with named columns.
-
-        Parameters
-        ----------
-        name
-            "trace" (samples at fixed intervals), "slips", "slip_trace" (finer samples around
-            slips), "stages" (completed stages of the drive), "avalanches", "snapshot_events",
-            "ruptures" and "fronts" (of an interface with a length).
-
-        Returns
-        -------
-        numpy.ndarray
-            Shape (rows), in SI units.
-
-        Raises
-        ------
-        RunError
-            If there is no such table, or its columns have no names.
-        """
+    def records(self, name: str) -> NDArray[np.void]:
+        """Rows recorded in a table with named columns up to now, as a structured array of shape
+        (rows), in SI units; raises a `RunError` if there is no such table."""
         columns = COLUMNS.get(name) if isinstance(name, str) else None
         if not columns:
             known = ", ".join(repr(other) for other, names in COLUMNS.items() if names)

@@ -1,4 +1,4 @@
-"""The spring at which steady sliding of a rigid or layered slider turns linearly unstable.
+"""The spring at which steady sliding of a rigid or layered slider loses linear stability.
 
 There K + Z(iω) + Λ(iω) = 0 at a frequency, Z being the dynamic stiffness of the slider without its
 spring. A damping that is given relative to the frequency of the setup grows with the spring.

@@ -17,6 +17,18 @@ from mesoslip.theory.steady_sliding import steady_sliding
 MAX_WORK = 10_000
 # K* over its estimate, for thresholds of 0.3 to 10 % of all laws, and exponential ones.
 ESTIMATE_RANGE = 0.2, 2.0
+# What `mesoslip info` prints first: the limits of force and stiffness, times of stick-slip.
+FIRST = (
+    "K_star_estimate",
+    "critical_stiffness_estimate",
+    "F_steady_drive",
+    "creep_velocity",
+    "mean_avalanche_size",
+    "crossing_time",
+    "loading_time",
+    "slip_time_sequential",
+    "drive_duration",
+)
 
 
 @dataclass(frozen=True)
@@ -51,6 +63,25 @@ def derived(config: ConfigLike) -> dict[str, Derived]:
         )
         if math.isfinite(value)
     }
+
+
+def overview(config: Config, found: dict[str, Derived]) -> dict[str, Derived]:
+    """The quantities to look at first, of those that were derived: forces, times and costs."""
+    force = config.contacts.static_force
+    first = {
+        "static_force": Derived(force, "N", "mean static threshold of all contacts, F_s"),
+        **{name: found[name] for name in FIRST if name in found},
+    }
+    life = found.get("mean_life_drive") or found.get("mean_life")
+    if life is not None and config.contacts.reattach and config.duration < math.inf:
+        length = math.fsum(part.path_length for part in config.drive_parts)
+        first["contact_breaks"] = Derived(
+            config.contacts.count * length / life.value,
+            "1",
+            "breaks in the run if it slides steadily; engine eq: 0.1 to 0.5 µs each for most "
+            "contacts",
+        )
+    return first
 
 
 def _drive(config: Config) -> Iterator[tuple[str, float, str, str]]:

@@ -56,8 +56,8 @@ MAX_CANDIDATES = 40
 # Maximum number of layers whose frequencies the points of the path resolve.
 MAX_LAYERS = 16
 
-# Relative width of thresholds with which contacts do not break in step.
-OUT_OF_STEP = 0.5
+# Relative width of thresholds with which contacts are dephased.
+DEPHASED_WIDTH = 0.5
 # Statements that linear theory leaves open, for a stable and an unstable motion.
 OTHER_MOTION = "A large oscillation may be possible too"
 NO_AMPLITUDE = "Linear theory gives no amplitude"
@@ -116,29 +116,29 @@ class LinearStability(abc.ABC):
         """dF/dv [N s/m]: below zero sliding is weaker the faster it is."""
 
     @cached_property
-    def out_of_step(self) -> LinearStability:
+    def dephased(self) -> LinearStability:
         """Sliding of contacts whose lives differ by half a breaking stretch; itself if they do.
 
         A large oscillation itself spreads lives by as much. That an instability which needs
-        contacts in step stays small is a heuristic, with exceptions (``docs/steady-sliding.md``).
+        contacts in phase stays small is a heuristic, with exceptions (``docs/steady-sliding.md``).
         """
         wide = self._with_wide_thresholds()
         return self if wide is None else type(self)(wide, self.velocity)
 
     @property
-    def is_stable_out_of_step(self) -> bool:
-        """Whether no perturbation grows for contacts out of step; see `out_of_step`."""
-        return self.out_of_step.is_stable
+    def is_stable_dephased(self) -> bool:
+        """Whether no perturbation grows for dephased contacts; see `dephased`."""
+        return self.dephased.is_stable
 
     def _with_wide_thresholds(self) -> Config | None:
-        """The configuration with thresholds out of step; None if they are as wide already."""
+        """The configuration with thresholds of dephased contacts; None if they have them."""
         contacts = self.config.contacts
         threshold = contacts.threshold
-        if threshold.relative_width >= OUT_OF_STEP or threshold.kind.is_sampled:
+        if threshold.relative_width >= DEPHASED_WIDTH or threshold.kind.is_sampled:
             return None
         widths = contacts.relative_widths.items()
         try:
-            return self.config.replace({key: max(width, OUT_OF_STEP) for key, width in widths})
+            return self.config.replace({key: max(width, DEPHASED_WIDTH) for key, width in widths})
         except ConfigError:
             return None
 
@@ -403,12 +403,12 @@ class LinearStability(abc.ABC):
                 f"{where} is linearly stable, with {self._ingredients}: small perturbations decay "
                 f"at {decay}. {other}"
             )
-        also = "but not" if self.is_stable_out_of_step else "also"
+        also = "but not" if self.is_stable_dephased else "also"
         growth = with_unit(self.growth_rate, "1/s", 3)
         return (
             f"{where} is linearly unstable, with {self._ingredients}: {self._perturbation} grows "
-            f"at {growth}, {also} for contacts out of step (thresholds of "
-            f"{percent(OUT_OF_STEP)}). {NO_AMPLITUDE}: {shown_by(self.config)}"
+            f"at {growth}, {also} for dephased contacts (thresholds of "
+            f"{percent(DEPHASED_WIDTH)}). {NO_AMPLITUDE}: {shown_by(self.config)}"
         )
 
     @property

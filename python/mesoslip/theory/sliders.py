@@ -259,7 +259,10 @@ def _first_slip(slider: InertialSlider, config: Config, film: float) -> Iterator
         return
     loading = contacts.static_force / slider.spring_stiffness / config.drive_speed
     yield Quantity(
-        "loading_time", loading, "s", "time in which the spring alone loads to F_s, F_s/(K v_d)"
+        "loading_time",
+        loading,
+        "s",
+        "time in which the spring alone loads to F_s, F_s/(K v_d); scale of the time between slips",
     )
     yield Quantity(
         "D1",
@@ -276,7 +279,10 @@ def _first_slip(slider: InertialSlider, config: Config, film: float) -> Iterator
         "(6/D1)^(1/3)",
     )
     yield Quantity(
-        "slip_time_sequential", alpha / omega_s, "s", "duration of such a slip, alpha/Omega_S"
+        "slip_time_sequential",
+        alpha / omega_s,
+        "s",
+        "duration of a slip in which contacts break one after another, alpha/Omega_S",
     )
     # The peak of F(X) lies near F_s - Delta F_s, so D0 = F_d(X_c)/F_s is about 1 - delta.
     start = 1 - contacts.threshold.relative_width - film * d_1 / omega_s

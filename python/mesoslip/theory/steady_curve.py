@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 
 # Decades of velocities on either side, and velocities of each.
 DECADES, VELOCITIES_A_DECADE = 3, 2
-# Relative error of a velocity at which sliding turns unstable.
+# Relative error of a velocity at which sliding loses stability.
 TOLERANCE = 0.01
 
 
@@ -60,7 +60,7 @@ class SteadyCurve:
 
     @cached_property
     def boundaries(self) -> tuple[float, ...]:
-        """Velocities at which sliding turns stable or unstable with the configured spring [m/s]."""
+        """Velocities at which sliding gains or loses stability with the configured spring [m/s]."""
         spring = self.config.spring_stiffness
         if not 0 < spring < math.inf or np.any(np.isnan(self.critical_stiffness)):
             return ()

@@ -53,7 +53,7 @@ def steady_sliding(config: Config, max_work: int) -> LinearStability | None:
         # The summary needs both, and caches them. Extreme parameters may overflow.
         with np.errstate(all="ignore"):
             if sliding.leading_root is not None and not sliding.is_stable:
-                _ = sliding.is_stable_out_of_step
+                _ = sliding.is_stable_dephased
     except RunError:
         return None
     return sliding
@@ -66,7 +66,7 @@ def stability_boundary(
     high: float,
     tolerance: float = 1e-3,
     *,
-    out_of_step: bool = False,
+    dephased: bool = False,
 ) -> float | None:
     """Value of a key at which steady sliding becomes stable or unstable, between two others.
 
@@ -80,9 +80,9 @@ def stability_boundary(
         Positive values, in SI, between which to search, on a logarithmic scale.
     tolerance
         Relative.
-    out_of_step
-        Whether stability is that of contacts that break out of step, as after slips
-        (`SteadySliding.is_stable_out_of_step`): that boundary is nearer to the results of runs.
+    dephased
+        Whether stability is that of dephased contacts, as after slips
+        (`SteadySliding.is_stable_dephased`): that boundary is nearer to the results of runs.
 
     Returns
     -------
@@ -91,7 +91,7 @@ def stability_boundary(
     """
 
     def is_stable(logarithm: float) -> bool:
-        return _is_stable(config, key, math.exp(logarithm), out_of_step=out_of_step)
+        return _is_stable(config, key, math.exp(logarithm), dephased=dephased)
 
     from scipy import optimize
 
@@ -108,12 +108,12 @@ def stability_boundary(
     return math.exp(found)
 
 
-def _is_stable(config: Config, key: str, value: float, *, out_of_step: bool) -> bool:
+def _is_stable(config: Config, key: str, value: float, *, dephased: bool) -> bool:
     sliding = sliding_of(config.replace({key: value}))
-    return sliding.is_stable_out_of_step if out_of_step else sliding.is_stable
+    return sliding.is_stable_dephased if dephased else sliding.is_stable
 
 
-def stable_stiffness(config: Config, *, out_of_step: bool = False) -> float | None:
+def stable_stiffness(config: Config, *, dephased: bool = False) -> float | None:
     """Stiffness of the spring above which steady sliding at the drive's velocity is stable [N/m].
 
     All other parameters are those of the configuration, the mass of the slider for example. It is
@@ -125,7 +125,7 @@ def stable_stiffness(config: Config, *, out_of_step: bool = False) -> float | No
     ----------
     config
         The configuration, of a slider on a spring.
-    out_of_step
+    dephased
         As in `stability_boundary`.
 
     Returns
@@ -137,23 +137,21 @@ def stable_stiffness(config: Config, *, out_of_step: bool = False) -> float | No
     max_stiffness = MAX_STIFFNESS * config.contacts.stiffness
     sliding = sliding_of(config)
     if sliding.has_critical_stiffness:
-        critical = (sliding.out_of_step if out_of_step else sliding).critical_stiffness
+        critical = (sliding.dephased if dephased else sliding).critical_stiffness
         return critical[0] if critical and critical[0] < max_stiffness else None
-    return _first_stable_stiffness(config, max_stiffness, out_of_step=out_of_step)
+    return _first_stable_stiffness(config, max_stiffness, dephased=dephased)
 
 
 def _first_stable_stiffness(
-    config: Config, max_stiffness: float, *, out_of_step: bool
+    config: Config, max_stiffness: float, *, dephased: bool
 ) -> float | None:
     """The same by counting roots, from stiff springs to soft ones by factors of two."""
     key, stiffness = "slider.stiffness", max_stiffness
     while stiffness > MIN_STIFFNESS * config.contacts.stiffness:
-        if not _is_stable(config, key, stiffness, out_of_step=out_of_step):
+        if not _is_stable(config, key, stiffness, dephased=dephased):
             if stiffness == max_stiffness:
                 return None
-            return stability_boundary(
-                config, key, stiffness, 2 * stiffness, out_of_step=out_of_step
-            )
+            return stability_boundary(config, key, stiffness, 2 * stiffness, dephased=dephased)
         stiffness /= 2
     return None
 
@@ -165,15 +163,15 @@ class StiffnessLimits(NamedTuple):
     ----------
     velocity
         Velocity of sliding [m/s], that of the drive.
-    in_step
+    in_phase
         With delay [N/m].
-    out_of_step
-        The same for contacts that break out of step [N/m]; None if that is no smaller.
+    dephased
+        The same for dephased contacts [N/m]; None if that is no smaller.
     """
 
     velocity: float
-    in_step: float
-    out_of_step: float | None
+    in_phase: float
+    dephased: float | None
 
 
 def stiffness_limits(config: Config, max_work: int) -> StiffnessLimits | None:
@@ -184,11 +182,11 @@ def stiffness_limits(config: Config, max_work: int) -> StiffnessLimits | None:
         return None
     try:
         stable = stable_stiffness(config)
-        out_of_step = stable_stiffness(config, out_of_step=True)
+        dephased = stable_stiffness(config, dephased=True)
     except RunError:
         return None
     if stable is None:
         return None
-    if out_of_step is not None and out_of_step >= stable:
-        out_of_step = None
-    return StiffnessLimits(sliding.velocity, stable, out_of_step)
+    if dephased is not None and dephased >= stable:
+        dephased = None
+    return StiffnessLimits(sliding.velocity, stable, dephased)

@@ -58,10 +58,10 @@ def as_text(judgements: Sequence[Judgement]) -> str:
 def as_markdown(judgements: Sequence[Judgement]) -> str:
     """Judgements as a page."""
     lines = [
-        "# The source's claims, checked",
+        "# The source's claims, assessed",
         "",
         f"Written by `make claims`. Each claim of the source (`{judgements[0].claim.name}` to "
-        f"`{judgements[-1].claim.name}`) is judged from runs in",
+        f"`{judgements[-1].claim.name}`) is assessed from runs in",
         "`runs/source`; values are means and standard deviations over realizations. `make claims`",
         "compares what it finds with this page: a verdict that differs, or a number that differs",
         "by more than it scatters, is an error.",

@@ -142,13 +142,13 @@ class TraceNoise:
         if self.impulse_time.size:
             found.append(
                 f"impulses in {number(100 * self.impulse_share, 2)} % of the samples, "
-                f"{size(self.impulse_size)} in the median: taken off for slips and fits"
+                f"{size(self.impulse_size)} in the median: removed for slips and fits"
             )
         if self.hum:
             lines = ", ".join(
                 f"{size(one.amplitude)} at {number(one.frequency, 4)} Hz" for one in self.hum
             )
-            found.append(f"hum of {lines}: taken off for slips and fits")
+            found.append(f"hum of {lines}: removed for slips and fits")
         if self.drift:
             found.append(
                 f"drift of {size(self.drift * self.duration)} over {with_unit(self.duration, 's')}"

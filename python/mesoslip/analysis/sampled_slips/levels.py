@@ -111,7 +111,7 @@ class Side:
     def _rebound(self, low: int, top: int, bottom: int) -> float:
         """Rise just before a fall that is faster than loading, as ringing and impulses are.
 
-        Noise, which increases the difference of a maximum and a minimum, is taken off.
+        Noise, which increases the difference of a maximum and a minimum, is subtracted.
         """
         time = self.time
         duration = REBOUND * (time[bottom] - time[top])

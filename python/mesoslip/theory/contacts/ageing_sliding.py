@@ -83,7 +83,7 @@ class AgeingSliding(LinearStability):
         density = 1 / (self._life + self.delay)
         share = ends.weight / ends.approach
         missing = -np.expm1(-rate[:, None] * ends.age)
-        missing[self._are_out_of_step(rate)] = 1.0
+        missing[self._are_dephased(rate)] = 1.0
         lost, lost_load = missing @ share, missing @ (share * ends.stretch)
         number, load = self._transforms(rate)
         late, detached = self._delays.late(rate)
@@ -108,20 +108,20 @@ class AgeingSliding(LinearStability):
         load[slow] = np.sum(decay * steps * (back + self._rate * ages), axis=(1, 2))
         at = rate[~slow]
         last = np.exp(-at[:, None] * ends.age)
-        last[self._are_out_of_step(at)] = 0.0
+        last[self._are_dephased(at)] = 0.0
         number[~slow] = (1 - last @ ends.weight) / at
         moved = (number[~slow] - last @ (ends.weight * ends.age)) / at
         load[~slow] = back * number[~slow] + self._rate * moved
         return number, load
 
-    def _are_out_of_step(self, rate: Complex) -> NDArray[np.bool_]:
-        """Whether contacts break out of step with a motion: faster than the quadrature resolves,
+    def _are_dephased(self, rate: Complex) -> NDArray[np.bool_]:
+        """Whether contacts are dephased from a motion: faster than the quadrature resolves,
         over the lives of contacts, where e^(-λT) averages out."""
         weight, age = (one.reshape(-1, POINTS) for one in self._ends[:2])
         likely = weight.sum(axis=1) > UNLIKELY
         longest = float(np.max(np.ptp(age[likely], axis=1)))
-        out_of_step: NDArray[np.bool_] = np.abs(rate) * longest > MAX_TURN
-        return out_of_step
+        dephased: NDArray[np.bool_] = np.abs(rate) * longest > MAX_TURN
+        return dephased
 
     @property
     def _turns(self) -> Turns:

@@ -25,7 +25,7 @@ from mesoslip.errors import Problem
 from mesoslip.theory.contacts.base import KNOWN_KEYS
 from mesoslip.theory.frequency_paths import Parts, Turns
 from mesoslip.theory.life_transforms import LifeTransforms, Lives
-from mesoslip.theory.linear_stability import OUT_OF_STEP, LinearStability
+from mesoslip.theory.linear_stability import DEPHASED_WIDTH, LinearStability
 from mesoslip.theory.lives import newborn_stretch
 
 Array = NDArray[np.float64]
@@ -132,10 +132,10 @@ class SteadySliding(LinearStability):
         return self.delay == 0
 
     @cached_property
-    def out_of_step(self) -> SteadySliding:
-        if self.relative_width >= OUT_OF_STEP:
+    def dephased(self) -> SteadySliding:
+        if self.relative_width >= DEPHASED_WIDTH:
             return self
-        return SteadySliding(self.config, self.velocity, relative_width=OUT_OF_STEP)
+        return SteadySliding(self.config, self.velocity, relative_width=DEPHASED_WIDTH)
 
     @property
     def _ingredients(self) -> str:

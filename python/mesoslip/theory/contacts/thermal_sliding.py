@@ -134,7 +134,7 @@ class ThermalSliding(LinearStability):
 
     @cached_property
     def _fast(self) -> float:
-        """Rate from which contacts do not break in step with the slider [1/s]."""
+        """Rate from which contacts are dephased from the slider [1/s]."""
         if not self._are_reached:
             return FAST * self._breaking_rate
         width = self.config.contacts.threshold.relative_width

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import ast
 import inspect
-import sys
 from collections.abc import Iterator
-from functools import cache, partial
-from itertools import pairwise
+from functools import partial
 from typing import Any, Literal, get_args, get_origin
 
 import annotated_types
 from mesoslip.campaign.sweep_table import SweepTable
 from mesoslip.configuration.config import Config
+from mesoslip.configuration.meanings import meanings
 from mesoslip.configuration.messages import tables_in
 from mesoslip.configuration.sliders import SLIDERS
 from mesoslip.configuration.table import Table
@@ -76,7 +74,7 @@ def _summary(table: type[Table]) -> str:
 
 
 def _rows(table: type[Table], title: str) -> Iterator[str]:
-    documented = meanings(table)
+    documented = _documented(table)
     yield "| key | unit | default | allowed values | meaning |"
     yield "|---|---|---|---|---|"
     for name, field in table.model_fields.items():
@@ -93,30 +91,9 @@ def _rows(table: type[Table], title: str) -> Iterator[str]:
         yield "| " + " | ".join(cells) + " |"
 
 
-@cache
-def meanings(table: type[Table]) -> dict[str, str]:
-    """What the keys of a table mean: the text below each field.
-
-    Raises
-    ------
-    LookupError
-        If a key has none.
-    """
-    found: dict[str, str] = {}
-    for one in reversed(table.__mro__):
-        if not issubclass(one, Table) or one is Table:
-            continue
-        tree = ast.parse(inspect.getsource(sys.modules[one.__module__]))
-        body = next(
-            node.body
-            for node in tree.body
-            if isinstance(node, ast.ClassDef) and node.name == one.__name__
-        )
-        for field, text in pairwise(body):
-            if not (isinstance(field, ast.AnnAssign) and isinstance(text, ast.Expr)):
-                continue
-            if isinstance(text.value, ast.Constant) and isinstance(field.target, ast.Name):
-                found[field.target.id] = inspect.cleandoc(str(text.value.value)).replace("\n", " ")
+def _documented(table: type[Table]) -> dict[str, str]:
+    """The meanings of the keys of a table; a `LookupError` if a key has none."""
+    found = meanings(table)
     missing = table.model_fields.keys() - found.keys() - _tables_of_config(table)
     if missing:
         raise LookupError(f"{table.__name__}: no text below {', '.join(sorted(missing))}")

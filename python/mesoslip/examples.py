@@ -7,6 +7,7 @@ import tomllib
 from importlib.resources import files
 from pathlib import Path
 
+from mesoslip.configuration.config import Config
 from mesoslip.configuration.reading import PathLike, as_path, is_file
 from mesoslip.errors import ConfigError, FileError, Problem
 
@@ -14,8 +15,9 @@ ENDING = ".toml"
 
 
 def _folder() -> Path:
-    """The folder of the installed examples."""
-    return Path(str(files("mesoslip") / "runs"))
+    """The folder of the installed examples; in a development build that of the sources."""
+    installed = Path(str(files("mesoslip") / "runs"))
+    return installed if installed.is_dir() else Path(__file__).parents[2] / "runs"
 
 
 def examples() -> dict[str, str]:
@@ -28,6 +30,11 @@ def examples() -> dict[str, str]:
         title = tomllib.loads(text).get("title", first)
         found[path.relative_to(folder).with_suffix("").as_posix()] = str(title)
     return found
+
+
+def example_config(name: str) -> Config:
+    """The configuration of an example."""
+    return Config.load(_folder() / f"{name}{ENDING}")
 
 
 def example(name: str, file: PathLike | None = None) -> list[Path]:

@@ -8,32 +8,38 @@ import shutil
 import subprocess
 import sys
 import time
+from importlib.resources import files
 from pathlib import Path
 from urllib.parse import urlsplit
 
 import pytest
 from selenium import webdriver
 from selenium.webdriver.chrome.service import Service
+from selenium.webdriver.common.by import By
 from selenium.webdriver.support.ui import WebDriverWait
 
 ROOT = Path(__file__).parents[2]
 PATIENCE = 120
+AXE = files("axe_core_python").joinpath("axe.min.js").read_text("utf-8")
 
 # The models of the page, by what they are called.
 MODEL = "Bokeh.documents[0].get_model_by_name(arguments[0])"
-# Change a property of a model as its widget does, and wait until the picture of that is drawn.
+# Change an element as a hand does, or click it, and wait until the picture of that is drawn.
 CHANGE = """
 const done = arguments[arguments.length - 1]
-const [name, property, value] = arguments
-const find = (name) => Bokeh.documents[0].get_model_by_name(name)
-const status = find("status")
-const before = status.tags[0], start = performance.now()
-find(name)[property] = value
+const [name, value] = arguments
+const one = document.getElementById(name), status = document.getElementById("status").dataset
+const before = Number(status.turn), start = performance.now()
+if (value === null) one.click()
+else {
+  one.value = value
+  for (const kind of ["input", "change"]) one.dispatchEvent(new Event(kind, {bubbles: true}))
+}
 const look = () => {
-  if (status.tags[0] > before)
+  if (Number(status.turn) > before)
     // Figures draw in the next frame, or in the one after it if they drew a moment ago.
     requestAnimationFrame(() => requestAnimationFrame(() =>
-      done([performance.now() - start, status.tags[1] < 0 ? "refused" : "drawn"])))
+      done([performance.now() - start, status.part < 0 ? "refused" : "drawn"])))
   else if (performance.now() - start > 60000)
     done([performance.now() - start, "never"])
   else
@@ -104,8 +110,7 @@ class Browser:
         self.driver.get("about:blank")
         self.driver.get_log("browser")
         self.driver.get(address)
-        self.wait("return window.Bokeh && Bokeh.documents.length > 0")
-        self.wait("return Bokeh.documents[0].get_model_by_name('status').tags.length > 1")
+        self.wait("return document.getElementById('status')?.dataset.turn > 0")
 
     def wait(self, script: str, *arguments: object) -> None:
         WebDriverWait(self.driver, PATIENCE, 0.02).until(
@@ -114,10 +119,25 @@ class Browser:
 
     def wait_until_done(self) -> None:
         """Wait for the end of the run."""
-        self.wait("return Bokeh.documents[0].get_model_by_name('status').text == 'done'")
+        self.wait("return document.getElementById('status').textContent == 'done'")
 
-    def value(self, name: str, what: str):
-        """A property of a model."""
+    def value(self, name: str, what: str = "value"):
+        """A property of an element."""
+        return self.driver.execute_script(
+            "return document.getElementById(arguments[0])[arguments[1]]", name, what
+        )
+
+    def text(self, name: str) -> str:
+        """The text of an element."""
+        return self.value(name, "textContent")
+
+    def was(self, key: str) -> str:
+        """What a knob says of its value at the start."""
+        knob = self.element(f"knob:{key}")
+        return knob.find_element(By.CLASS_NAME, "was").get_attribute("textContent")
+
+    def model(self, name: str, what: str):
+        """A property of a figure or of what it draws."""
         return self.driver.execute_script(f"return {MODEL}.{what}", name)
 
     def data(self, name: str, column: str = "y") -> list[float]:
@@ -126,18 +146,27 @@ class Browser:
             f"return Array.from({MODEL}.data[arguments[1]])", name, column
         )
 
-    def change(self, name: str, value: object, property_: str = "value") -> tuple[float, str]:
-        """Change a model; seconds until that is drawn, and what became of it."""
-        milliseconds, became = self.driver.execute_async_script(CHANGE, name, property_, value)
+    def change(self, name: str, value: object = None) -> tuple[float, str]:
+        """Change an element, or click it; seconds until that is drawn, and what became of it."""
+        milliseconds, became = self.driver.execute_async_script(CHANGE, name, value)
         return milliseconds / 1000, became
 
-    def element(self, name: str, selector: str):
-        """An element of a widget, which lies in a shadow of its own."""
-        script = f"""
-          const view = Bokeh.index.find_one({MODEL})
-          return view.shadow_el.querySelector(arguments[1])
+    def element(self, name: str):
+        """An element."""
+        return self.driver.find_element(By.ID, name)
+
+    def findings(self) -> list[str]:
+        """What axe-core finds serious or critical on the page."""
+        self.driver.execute_script(AXE)
+        script = """
+          const done = arguments[arguments.length - 1]
+          axe.run(document, {resultTypes: ["violations"]}).then(({passes, violations}) =>
+            done([passes.length, violations.map(({impact, id, nodes}) =>
+              [impact, `${id}: ${nodes[0].html} ${nodes[0].failureSummary}`])]))
         """
-        return self.driver.execute_script(script, name, selector)
+        passed, found = self.driver.execute_async_script(script)
+        assert passed > 10
+        return [text for impact, text in found if impact in {"serious", "critical"}]
 
     def requests(self) -> list[str]:
         """Everything that was asked for since the last time."""

@@ -5,13 +5,18 @@ from __future__ import annotations
 import asyncio
 import functools
 import gc
+import json
+import re
 import shlex
 import subprocess
 import sys
 import threading
 import time
 import tomllib
+import zlib
+from base64 import urlsafe_b64encode
 from pathlib import Path
+from urllib.parse import parse_qsl
 
 import mesoslip
 import numpy as np
@@ -21,11 +26,14 @@ from jinja2 import Environment
 from kinds import DIFFERENT, KINDS, configuration
 from mesoslip import Config
 from mesoslip.configuration.keys import key_kind
-from mesoslip.errors import ConfigError, FileError
+from mesoslip.errors import ConfigError, FileError, MesoslipError
+from mesoslip.examples import example_config
 from mesoslip.execution.newest_job import NewestJob
 from mesoslip.execution.stop import Stop
-from mesoslip.explorer.controls import CONTROLS, ROW_HEIGHTS, STEPS, lattice_size, values
-from mesoslip.explorer.live_run import Pace, explored, run_live
+from mesoslip.explorer.controls import BY_KEY, CONTROLS, ROW_HEIGHTS, STEPS, lattice_size, values
+from mesoslip.explorer.knobs import Knob
+from mesoslip.explorer.links import presets
+from mesoslip.explorer.live_run import Pace, explored, run_live, runnable
 from mesoslip.explorer.movies import (
     around_slip,
     finished_run,
@@ -62,6 +70,11 @@ STARTS = {
     "contacts.drag": ("contacts.drag_rate=0", "contacts.drag=0.01 N s/m"),
     "slider.damping": ("slider.damping_ratio=none", "slider.damping=20 1/s"),
 }
+
+
+def link_file(text):
+    """A file in a link."""
+    return urlsafe_b64encode(zlib.compress(text)).decode().rstrip("=")
 
 
 def theory(config):
@@ -403,10 +416,13 @@ def test_every_kind_of_run_is_drawn(kind):
     seen = []
     run_live(explored(config), Stop(), lambda results: seen.append(motion(results)))
     drawn = seen[-1]
-    for line in (drawn.force, drawn.velocity, drawn.detached):
+    # Contacts without a delay are never detached.
+    detached = () if drawn.detached.is_empty else (drawn.detached,)
+    for line in (drawn.force, drawn.velocity, *detached):
         assert len(line.x) == len(line.y) > 1
         assert np.all(np.isfinite(line.y))
         assert line.x_label.startswith("time")
+        assert line.description
     assert (drawn.lattice is not None) == (config.interaction is not None)
     assert drawn.regime
 
@@ -417,6 +433,7 @@ def test_pictures_are_as_long_as_a_picture_is_wide():
     run_live(config, Stop(), lambda results: seen.append(motion(results)))
     drawn = seen[-1]
     assert len(drawn.force.x) < 4000
+    assert drawn.detached.y.max() == config.contacts.count
     # The first spike of Klein's case: 18 uN less the spread of the thresholds.
     assert 17.0 < np.max(drawn.force.y) < 18.0
     assert drawn.force.y_label == "spring force (µN)"
@@ -607,57 +624,224 @@ def test_what_cannot_be_explored_is_reported(command):
     assert "contacts.delay" in errors
 
 
-def test_the_page_is_of_every_control():
-    """It is made without a browser, and takes changes as its widgets give them."""
+def page_of(*changes, query=()):
+    """A page without a browser, and its document."""
     document = pytest.importorskip("bokeh.document").Document()
     from mesoslip.explorer.view import Page
 
-    page = Page(document, Config.load(KLEIN), KLEIN)
+    return Page(document, Config.load(KLEIN, changes), KLEIN, None, query), document
+
+
+def ask(page, action, name="", value=None):
+    """Ask for something as the browser does."""
+    number, *_ = page.elements.requests.tags or [0]
+    page.elements.requests.tags = [number + 1, action, name, value]
+
+
+def work(document, is_done):
+    """Do what the server and the browser do, until something is done."""
+    drawn, end = document.get_model_by_name("drawn"), time.monotonic() + 60
+    while not is_done():
+        assert time.monotonic() < end
+        for callback in document.session_callbacks:
+            document.remove_next_tick_callback(callback)
+            callback.callback()
+        drawn.tags = [drawn.tags[0] + 1, "run"]
+        time.sleep(0.001)
+
+
+def is_drawn(page):
+    """Whether the run of the last change is drawn to its end."""
+    status = page.elements["status"]
+    return status.get("turn", 0) >= page._turn and status["part"] >= 1
+
+
+def test_the_page_is_of_every_control():
+    """It is made without a browser, and takes changes as its elements give them."""
+    page, _ = page_of()
+    shown = page.elements
     try:
-        for control in CONTROLS:
-            assert document.get_model_by_name(control.key) is not None
-        field = document.get_model_by_name("contacts.delay")
-        slider = document.get_model_by_name("contacts.delay:slider")
-        field.value = "1 ms"
+        ask(page, "set", "contacts.delay", "1 ms")
         # The slider follows without a change of its own.
         assert page.session.changes == {"contacts.delay": "1 ms"}
-        assert slider.value > STEPS / 2
-        slider.value = STEPS
+        assert shown["contacts.delay"]["position"] > STEPS / 2
+        assert shown["contacts.delay"]["was"] == "● was 500 µs"
+        ask(page, "move", "contacts.delay", STEPS)
         assert page.session.config.contacts.delay == pytest.approx(0.05)
-        field.value = "what?"
-        assert document.get_model_by_name("contacts.delay:message").visible
-        slider.value = STEPS - 1
-        assert not document.get_model_by_name("contacts.delay:message").visible
+        ask(page, "set", "contacts.delay", "what?")
+        assert shown["contacts.delay"]["isError"]
+        assert shown["contacts.delay"]["value"] == "50 ms"
+        ask(page, "move", "contacts.delay", STEPS - 1)
+        assert not shown["contacts.delay"]["message"]
+        for control in CONTROLS:
+            assert control.meaning.endswith(".")
+            assert shown[control.key]["hidden"] == (control.key not in page.session.shown)
     finally:
         page.close()
+
+
+def test_every_element_has_a_name_and_what_is_shown_has_its_element():
+    """Those that a keyboard reaches; names of knobs are their labels, values are with units."""
+    from html.parser import HTMLParser
+
+    from mesoslip.explorer.server import ENVIRONMENT
+
+    class Reader(HTMLParser):
+        def __init__(self):
+            super().__init__()
+            self.ids, self.labelled, self.named, self.fields, self.within = set(), set(), [], [], []
+
+        def handle_starttag(self, tag, attributes):
+            given = dict(attributes)
+            self.ids.add(given.get("id"))
+            self.labelled.add(given.get("for") if tag == "label" else None)
+            self.within += [tag] if tag in {"label", "button"} else []
+            if tag in {"input", "select"}:
+                self.fields.append((given, "label" in self.within))
+
+        def handle_endtag(self, tag):
+            if tag in self.within:
+                self.within.remove(tag)
+
+    page, document = page_of()
+    try:
+        page._update()
+        # Without the frame of Bokeh around it.
+        source = (ROOT / "python/mesoslip/explorer/page.html").read_text("utf-8")
+        body = source.split("{% block contents %}")[1].rpartition("{% endblock %}")[0]
+        given = document.template_variables
+        context = {"embed": lambda _: "", "roots": dict.fromkeys(given["figures"], "")}
+        text = ENVIRONMENT.from_string(body).render(given | context)
+    finally:
+        page.close()
+    reader = Reader()
+    reader.feed(text)
+    for given, is_in_label in reader.fields:
+        is_named = is_in_label or "aria-label" in given or given["id"] in reader.labelled
+        assert is_named or given["aria-labelledby"] in reader.ids, given
+        for one in given.get("aria-describedby", "").split():
+            assert one in reader.ids
+    for control in CONTROLS:
+        assert control.key in reader.labelled
+    assert "η<sub>S</sub>/Ω<sub>S</sub>" in text
+    assert set(json.loads(page.elements.state.tags[0])["elements"]) <= reader.ids
+
+
+def test_a_link_is_the_setting(session):
+    assert session.link == ""
+    assert session.change("contacts.delay", "1 ms")
+    assert session.change("slider.kind", "layered")
+    assert session.change("drive.stage", STAGES)
+    assert session.link.startswith("?run=klein&contacts.delay=1+ms&")
+    page, _ = page_of(query=parse_qsl(session.link[1:]))
+    assert page.session.config == session.config
+    assert page.session.changes == session.changes
+    assert not page.elements._shown.get("error")
+    page.close()
+    # A configuration of one's own is in the link as a whole.
+    mine = Session(Config.load(KLEIN, ["title=mine", "contacts.delay_law=exponential"]), "my.toml")
+    assert mine.change("contacts.count", "1000")
+    assert len(mine.link) < 1000
+    session.follow(parse_qsl(mine.link[1:]))
+    assert session.config == mine.config
+    assert session.text("contacts.count") == "1000"
+    # Of a ready run without changes too.
+    assert session.begin(example_config("track"), "track.toml")
+    assert session.link == "?run=track"
+
+
+@pytest.mark.parametrize(
+    ("query", "message"),
+    [
+        ("contacts.delay=1+kg", "contacts.delay: has the unit kg; expected a quantity"),
+        ("contacts.delai=1+ms", "“contacts.delai” is no key that a link may change"),
+        ("drive.history.file=/etc/passwd", "no key that a link may change"),
+        ("run=kleine", "there is no ready run “kleine”"),
+        ("toml=abc", "its file is damaged"),
+        ("toml=" + link_file(b"[contacts.threshold]\nfile = 'x'"), "must not name a file"),
+        ("toml=" + link_file(b"#" * 1_000_000), "cut off, or too long"),
+        ("contacts.count=100000000", "contacts.count: more than"),
+    ],
+)
+def test_a_bad_link_says_what_is_wrong_and_starts_with_the_default(session, query, message):
+    before = session.config
+    with pytest.raises(MesoslipError, match=re.escape(message)):
+        session.follow(parse_qsl(query))
+    assert session.config == before
+    assert session.link == ""
+
+
+def test_a_bad_link_is_reported_until_the_next_change():
+    page, _ = page_of(query=[("run", "kleine")])
+    try:
+        page._show_controls()
+        assert "“kleine”" in page.elements["error"]["text"]
+        assert page.elements["error"]["text"].endswith("This is the default.")
+        ask(page, "set", "contacts.delay", "1 ms")
+        assert page.elements["error"]["text"] == ""
+    finally:
+        page.close()
+
+
+def test_changes_are_undone_and_done_again(session, monkeypatch):
+    clock = [0.0]
+    monkeypatch.setattr("mesoslip.explorer.session.time.monotonic", lambda: clock[0])
+    assert not session.can_undo
+    for delay in ("0.6 ms", "0.7 ms", "0.8 ms"):
+        # One move of a slider.
+        assert session.change("contacts.delay", delay)
+    assert session.change("slider.kind", "layered")
+    assert not session.change("contacts.delay", "what?")
+    assert session.undo()
+    assert session.changes == {"contacts.delay": "0.8 ms"}
+    assert session.undo()
+    assert session.changes == {}
+    assert not session.can_undo
+    assert session.redo()
+    assert session.redo()
+    assert session.config.slider.layer_count == 8
+    assert not session.can_redo
+    assert session.begin(example_config("track"), "track.toml")
+    assert session.reset()
+    for _ in range(2):
+        assert session.undo()
+    assert session.source == KLEIN
+    assert session.changes["contacts.delay"] == "0.8 ms"
+    # A new change forgets what was undone.
+    clock[0] = 10.0
+    assert session.change("contacts.delay", "0.9 ms")
+    assert not session.can_redo
+
+
+def test_a_failed_run_leaves_no_step_in_the_history(session):
+    assert session.change("contacts.delay", "0.4 ms")
+    assert session.change("slider.kind", "layered")
+    assert session.take_back("the solver failed")
+    assert session.problems == {"slider.kind": "the solver failed"}
+    assert not session.can_redo
+    assert session.undo()
+    assert session.changes == {}
+
+
+@pytest.mark.parametrize("name", presets())
+def test_every_ready_run_of_the_page_is_drawn(name):
+    stop, seen = Stop(), []
+    stop.set()
+    run_live(runnable(example_config(name)), stop, lambda results: seen.append(motion(results)))
+    assert len(seen) == 1
+    assert Session(example_config(name), f"{name}.toml").is_runnable
 
 
 @pytest.mark.long
 @alone
 def test_changes_leave_nothing_behind():
     """After many changes there is one run, and as many objects as after a few."""
-    document = pytest.importorskip("bokeh.document").Document()
-    from mesoslip.explorer.view import Page
-
     small = ["run.duration=0.5 s", "contacts.count=400", "output.slip_interval=100 us"]
-    page = Page(document, Config.load(KLEIN, small), KLEIN)
-    drawn = document.get_model_by_name("status")
-    acknowledged = document.get_model_by_name("drawn")
-
-    def wait_for_picture():
-        """Do what the server and the browser do."""
-        end = time.monotonic() + 60
-        while drawn.tags[0] < page._turn or drawn.tags[1] < 1:
-            assert time.monotonic() < end
-            for callback in document.session_callbacks:
-                document.remove_next_tick_callback(callback)
-                callback.callback()
-            acknowledged.tags = [acknowledged.tags[0] + 1]
-            time.sleep(0.001)
+    page, document = page_of(*small)
 
     def change(number):
-        document.get_model_by_name("contacts.delay").value = f"{1 + number} ms"
-        wait_for_picture()
+        ask(page, "set", "contacts.delay", f"{1 + number} ms")
+        work(document, lambda: is_drawn(page))
 
     def counted():
         page._workers["theory"].cancel()
@@ -739,53 +923,33 @@ def test_memory_of_a_run_that_was_replaced_is_returned():
 
 
 def test_a_refused_change_leaves_the_run_as_it_was():
-    """It goes on to its end, and its output can be downloaded."""
-    document = pytest.importorskip("bokeh.document").Document()
-    from mesoslip.explorer.view import Page
-
-    page = Page(document, Config.load(KLEIN, ["run.duration=1 s"]), KLEIN)
-    status, drawn = (document.get_model_by_name(name) for name in ("status", "drawn"))
+    """It continues to its end, and its output can be downloaded."""
+    page, document = page_of("run.duration=1 s")
     try:
         page._update()
-        document.get_model_by_name("contacts.count").value = "100000000"
-        assert "red" in status.text
-        assert document.get_model_by_name("contacts.count:message").visible
-        end = time.monotonic() + 60
-        while page._results is None and time.monotonic() < end:
-            for callback in document.session_callbacks:
-                document.remove_next_tick_callback(callback)
-                callback.callback()
-            drawn.tags = [drawn.tags[0] + 1]
-            time.sleep(0.001)
-        assert page._results is not None
+        ask(page, "set", "contacts.count", "100000000")
+        assert "red" in page.elements["status"]["text"]
+        assert page.elements["contacts.count"]["isError"]
+        work(document, lambda: page._results is not None)
         assert page._results.config.contacts.count == 4080
         # What is wrong is still reported.
-        assert "red" in status.text
+        assert "red" in page.elements["status"]["text"]
     finally:
         page.close()
 
 
 def test_a_slider_goes_back_from_what_is_refused(session):
     """One of a key that applies, and one that a hand moves as its key ceases to apply."""
-    pytest.importorskip("bokeh")
-    from mesoslip.explorer.controls import BY_KEY
-    from mesoslip.explorer.knobs import ControlView
-
-    knob = ControlView(BY_KEY["slider.stiffness"], session, session.change)
-    assert knob._slider.value == STEPS / 2
-    knob._slider.value = 148
+    knob = Knob(BY_KEY["slider.stiffness"], session)
+    assert knob.state["position"] == STEPS / 2
+    assert session.change("slider.stiffness", knob.text_at(148))
     assert session.change("slider.kind", "layered")
-    knob.show()
-    assert knob._slider.value == 148
+    assert knob.state["position"] == 148
     assert session.change("slider.kind", "prescribed")
-    knob.show()
-    knob._slider.value = 20
-    knob.show()
-    assert session.problems
-    assert knob._slider.value == 148
+    assert knob.state["position"] == 148
+    assert not session.change("slider.stiffness", knob.text_at(20))
     assert session.reset()
-    knob.show()
-    assert knob._slider.value == STEPS / 2
+    assert knob.state["position"] == STEPS / 2
 
 
 def test_a_page_is_built_beside_the_pages_that_are_open(monkeypatch):
@@ -874,7 +1038,7 @@ def test_pages_are_limited_and_idle_ones_make_room(monkeypatch):
 
 
 def test_the_models_of_a_page_are_collected_once(monkeypatch):
-    """Though it has fifty roots."""
+    """Not for each of its figures."""
     document = pytest.importorskip("bokeh.document").Document()
     from mesoslip.explorer.view import Page
 
@@ -884,7 +1048,7 @@ def test_the_models_of_a_page_are_collected_once(monkeypatch):
         type(document.models), "recompute", lambda self: collected.append(collect(self))
     )
     Page(document, Config.load(KLEIN), KLEIN).close()
-    assert len(document.roots) > 40
+    assert len(document.roots) > 5
     assert len(collected) <= 2
 
 

@@ -91,7 +91,8 @@ class Config(Table):
 
     def __eq__(self, other: object) -> bool:
         """Whether both describe the same run; their bases are not compared."""
-        return isinstance(other, Config) and self.__dict__ == other.__dict__
+        # Cached properties are in the dictionaries of both too.
+        return isinstance(other, Config) and self._tables == other._tables
 
     @property
     def base(self) -> Config | None:

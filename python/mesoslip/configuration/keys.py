@@ -36,9 +36,8 @@ class KeyKind:
         return cf_units(self.unit)
 
 
-@cache
-def key_kind(key: str) -> KeyKind | None:
-    """The kind of value of a dotted key such as "contacts.delay"; None if there is no such key."""
+def tables_of(key: str) -> list[type[Table]]:
+    """The tables that have a dotted key, such as those of several kinds of sliders."""
     *outer, last = key.split(".")
     tables: list[type[Table]] = [Config]
     for name in outer:
@@ -48,7 +47,14 @@ def key_kind(key: str) -> KeyKind | None:
             if name in table.fields()
             for inner in tables_in(table.fields()[name].annotation)
         ]
-    fields = [table.fields()[last] for table in tables if last in table.fields()]
+    return [table for table in tables if last in table.fields()]
+
+
+@cache
+def key_kind(key: str) -> KeyKind | None:
+    """The kind of value of a dotted key such as "contacts.delay"; None if there is no such key."""
+    last = key.rpartition(".")[2]
+    fields = [table.fields()[last] for table in tables_of(key)]
     if not fields:
         return None
     parts = [

@@ -17,6 +17,7 @@ from mesoslip.configuration.contacts.tables import (
 )
 from mesoslip.configuration.differences import flat
 from mesoslip.configuration.keys import key_kind
+from mesoslip.configuration.meanings import meaning
 from mesoslip.configuration.sliders import SLIDERS
 from mesoslip.configuration.threshold_laws import LAWS
 from mesoslip.quantities import with_unit
@@ -65,6 +66,13 @@ class Control:
     """Whether it is a list, which is written in words."""
     is_switch: bool = False
     """Whether it is a table, of which a choice gives the keys."""
+    own_meaning: str = ""
+    """The meaning of the key here, if other than in the reference of keys."""
+
+    @property
+    def meaning(self) -> str:
+        """The meaning of the key."""
+        return self.own_meaning or meaning(self.key)
 
     @property
     def group(self) -> str:
@@ -190,13 +198,14 @@ CONTROLS = (
     Control("run.seed", "seed", range=(1, 100)),
     Control(
         "run.engine",
-        "contacts are",
+        "engine",
         choices=("eq", "me"),
-        choice_labels={"eq": "N, one by one", "me": "N → ∞, the master equation"},
+        choice_labels={"eq": "finite N", "me": "N → ∞, master equation"},
     ),
     Control(
         "slider.kind",
-        "kind",
+        "kind of slider",
+        own_meaning="What moves on the contacts, and how the drive pulls it.",
         # A slider under a force needs another drive, which has no knob.
         choices=tuple(name for name, slider in SLIDERS.items() if not slider.takes_forces),
         required={
@@ -223,15 +232,30 @@ CONTROLS = (
     Control("contacts.drag_rate", "drag rate η", 5, usual=1e11),
     Control("contacts.drag", "drag Nmη", 5, usual=1e-4),
     Control("contacts.coupling", "coupling", choices=RULES),
-    Control("contacts.initial", "at the start", choices=tuple(INITIAL_STATES)),
+    Control("contacts.initial", "initial state", choices=tuple(INITIAL_STATES)),
     Control("contacts.renewal", "thresholds of later lives", choices=tuple(RENEWALS)),
-    Control("contacts.threshold.law", "law", choices=WIDTH_LAWS),
+    Control(
+        "contacts.threshold.law",
+        "threshold law",
+        choices=WIDTH_LAWS,
+        choice_labels={
+            "exponential": "exponential",
+            "gaussian": "normal (Gaussian)",
+            "lognormal": "log-normal",
+            "uniform": "uniform",
+            "weibull": "Weibull",
+        },
+    ),
     Control("contacts.threshold.relative_width", "width Δf_s/f_s", 2, (1e-3, 1), 0.01),
     Control(
         "contacts.ageing.law",
-        "law",
+        "ageing law",
         choices=(NONE, "log", "relax"),
-        choice_labels={"log": "thresholds grow as a logarithm", "relax": "thresholds relax"},
+        choice_labels={
+            NONE: "no ageing",
+            "log": "logarithmic growth",
+            "relax": "exponential approach",
+        },
         required={
             "log": {
                 "contacts.ageing.time": "1 ms",
@@ -249,7 +273,13 @@ CONTROLS = (
     Control("contacts.ageing.time", "time τ_a", 3, usual=1e-3),
     Control("contacts.ageing.growth", "growth β", 1.5, usual=0.05),
     Control("contacts.ageing.young_force_ratio", "young force over old", range=(0.05, 1)),
-    Control("contacts.ageing.young_relative_width", "width of the young", 1, (1e-3, 1), 0.1),
+    Control(
+        "contacts.ageing.young_relative_width",
+        "spread of young contacts",
+        1,
+        (1e-3, 1),
+        0.1,
+    ),
     Control(
         "contacts.thermal",
         "contacts break",

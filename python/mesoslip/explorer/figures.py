@@ -2,43 +2,53 @@
 
 from __future__ import annotations
 
-import html
-from collections.abc import Callable
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from bokeh.document import Document
-from bokeh.layouts import row
-from bokeh.models import ColumnDataSource, CustomJS, LinearColorMapper, Range1d
+from bokeh.models import ColumnDataSource, LinearColorMapper, Range1d
 from bokeh.models.annotations import BoxAnnotation, ColorBar, Span
 from bokeh.models.formatters import BasicTickFormatter
 from bokeh.models.ui import UIElement
-from bokeh.models.widgets import Div, Slider, Toggle
 from bokeh.plotting import figure
 
-from mesoslip.explorer.knobs import set_changed
-from mesoslip.explorer.live_run import Pace
-from mesoslip.explorer.pictures import Lattice, Line, Motion, Theory
+from mesoslip.explorer.elements import Elements
+from mesoslip.explorer.pictures import NOTHING, Lattice, Line, Motion, Theory
 from mesoslip.quantities import with_unit
 
 # Time between two snapshots of an animated lattice [ms].
 FRAME_MILLISECONDS = 120
-# Colors of N contacts, and of infinitely many.
-FIRST, SECOND = "#1f3b6f", "#c2571a"
+# Lines that are drawn over those of the run, by their names in legends.
+LIMIT, PINNED, MEASURED = "N → ∞", "pinned", "measured"
+THIS = "this run"
+# Colors of the run, and of what is drawn over it.
+FIRST, CONTACT = "#1f3b6f", "#8a8f98"
+OVER = {MEASURED: "#777777", LIMIT: "#c2571a", PINNED: "#c98a00"}
 # Room for the numbers of an axis, so that axes below each other have the same length [px].
 LEFT, RIGHT = 64, 12
-# Reports that a picture was drawn, which figures do in the next frame of the browser.
-ACKNOWLEDGE = """
-requestAnimationFrame(() => requestAnimationFrame(() => { drawn.tags = [...cb_obj.tags] }))
-"""
+
+
+def set_changed(model: Any, **properties: Any) -> None:
+    """Set the properties of a model that differ: the browser draws again for each that is set."""
+    for name, value in properties.items():
+        if getattr(model, name) != value:
+            setattr(model, name, value)
 
 
 class Plot:
-    """A picture of lines, each with its own source."""
+    """A picture of lines, each with its own source; without a line it is hidden."""
 
     def __init__(
-        self, name: str, title: str, colors: dict[str, str], height: int = 175, **style: Any
+        self,
+        elements: Elements,
+        name: str,
+        title: str,
+        colors: Mapping[str, str],
+        height: int = 175,
+        **style: Any,
     ) -> None:
+        self._elements, self._name = elements, name
         self.figure = figure(
             name=name,
             title=title,
@@ -58,138 +68,127 @@ class Plot:
         self.sources = {}
         for label, color in colors.items():
             source = ColumnDataSource({"x": [], "y": []}, name=f"{name}:{label}")
-            legend: dict[str, Any] = {"legend_label": label} if len(colors) > 1 else {}
-            self.figure.line("x", "y", source=source, color=color, line_width=1.3, **legend)
-            self.sources[label] = source
-        if len(colors) > 1:
-            # Above the picture, where no line can be.
-            self.figure.add_layout(self.figure.legend[0], "above")
-            self.figure.legend.update(
-                orientation="horizontal",
-                label_text_font_size="8pt",
-                border_line_color=None,
-                background_fill_alpha=0.0,
-                padding=0,
-                margin=0,
+            dash = "dashed" if label == PINNED else "solid"
+            self.figure.line(
+                *("x", "y"),
+                source=source,
+                color=color,
+                line_width=1.3,
+                line_dash=dash,
+                legend_label=label,
             )
+            self.sources[label] = source
+        # Above the picture, where no line can be.
+        self.figure.add_layout(self.figure.legend[0], "above")
+        self.figure.legend.update(
+            orientation="horizontal",
+            label_text_font_size="8pt",
+            border_line_color=None,
+            background_fill_alpha=0.0,
+            padding=0,
+            margin=0,
+        )
 
-    def show(self, **lines: Line) -> None:
-        """Draw lines by their labels."""
-        for label, drawn in lines.items():
-            self.sources[label.replace("_", " ")].data = {"x": drawn.x, "y": drawn.y}
-        named = next((one for one in lines.values() if not one.is_empty), None)
-        for legend in self.figure.legend:
-            set_changed(legend, visible=named is not None)
-        if named is not None:
-            set_changed(self.figure.xaxis[0], axis_label=named.x_label)
-            set_changed(self.figure.yaxis[0], axis_label=named.y_label)
+    def show(self, title: str, lines: Mapping[str, Line]) -> None:
+        """Draw lines by their labels in the units of the first one that has points."""
+        drawn = [label for label, one in lines.items() if not one.is_empty]
+        self._elements.show(f"panel:{self._name}", hidden=not drawn)
+        for label, source in self.sources.items():
+            one = lines.get(label, NOTHING)
+            if drawn:
+                one = one.on(lines[drawn[0]])
+            if len(one.x) or len(source.data["x"]):
+                source.data = {"x": one.x, "y": one.y}
+        if not drawn:
+            return
+        first = lines[drawn[0]]
+        (legend,) = self.figure.legend
+        set_changed(legend, visible=len(drawn) > 1)
+        for label, item in zip(self.sources, legend.items, strict=True):
+            set_changed(item, visible=label in drawn)
+        set_changed(self.figure.title, text=title)
+        set_changed(self.figure.xaxis[0], axis_label=first.x_label)
+        set_changed(self.figure.yaxis[0], axis_label=first.y_label)
+        words = "; ".join(f"{label}: {lines[label].description}" for label in drawn)
+        self._elements.show(f"described:{self._name}", text=words)
+
+
+# Titles of the pictures of a run, and their heights.
+TITLES = {
+    "force": ("Force", 210),
+    "velocity": ("Velocity", 175),
+    "load": ("Normal force", 175),
+    "detached": ("Detached contacts", 175),
+    "slip": ("The largest slip", 190),
+}
 
 
 class MotionView:
-    """Pictures of a run: force, velocity and detached contacts, and a slip in close-up.
+    """Pictures of a run, with other runs over it: force, velocity, detached contacts, and the
+    largest slip in close-up."""
 
-    The names of its models begin with the prefix. `drawn` is called when the browser has drawn a
-    picture.
-    """
-
-    def __init__(
-        self,
-        prefix: str,
-        title: str,
-        color: str,
-        drawn: Callable[[], None],
-        has_trace: bool = False,
-    ) -> None:
-        self.pace = Pace()
-        self._count = 0
+    def __init__(self, elements: Elements) -> None:
         self._range = Range1d(start=0, end=1)
-        self.title = Div(text=f"<b>{html.escape(title)}</b>", name=f"{prefix}title")
-        self.summary = Div(text="", name=f"{prefix}regime", sizing_mode="stretch_width")
         # The time of the lattice that is shown.
         self.now = Span(location=0, dimension="height", line_color="gray", visible=False)
-        self.force = Plot(
-            f"{prefix}force",
-            "Spring force",
-            {"measured": "#999999", "force": color} if has_trace else {"force": color},
-            210,
-            x_range=self._range,
-        )
-        self._has_trace = has_trace
-        self.force.figure.add_layout(self.now)
+        over = {name: OVER[name] for name in (LIMIT, PINNED)}
+        self._plots = {}
+        for name, (title, height) in TITLES.items():
+            is_slip = name == "slip"
+            colors = {"spring force" if is_slip else THIS: FIRST} | over
+            if name == "force":
+                colors = {MEASURED: OVER[MEASURED]} | colors
+            if is_slip:
+                colors = {"contact force": CONTACT} | colors
+            style: dict[str, Any] = {} if is_slip else {"x_range": self._range}
+            self._plots[name] = Plot(elements, name, title, colors, height, **style)
+        force = self._plots["force"].figure
+        force.add_layout(self.now)
         self._done = BoxAnnotation(left=0, fill_color="#888888", fill_alpha=0.12, visible=False)
-        self.force.figure.add_layout(self._done)
-        self.velocity = Plot(
-            f"{prefix}velocity", "Velocity", {"velocity": color}, x_range=self._range
-        )
-        self.detached = Plot(
-            f"{prefix}detached", "Detached contacts", {"detached": color}, x_range=self._range
-        )
-        self.slip = Plot(
-            f"{prefix}slip",
-            "The largest slip",
-            {"spring force": color, "contact force": "#999999"},
-            190,
-        )
-        self.plots = (self.force, self.velocity, self.detached, self.slip)
-        acknowledged = ColumnDataSource(name=f"{prefix}drawn", tags=[0])
+        force.add_layout(self._done)
+        self.roots: list[UIElement] = [plot.figure for plot in self._plots.values()]
 
-        def was_drawn(_attribute: str, _old: Any, _new: Any) -> None:
-            self.pace.drawn()
-            drawn()
-
-        acknowledged.on_change("tags", was_drawn)
-        self.summary.js_on_change("tags", CustomJS(args={"drawn": acknowledged}, code=ACKNOWLEDGE))
-
-    @property
-    def roots(self) -> list[UIElement]:
-        """The models on the page."""
-        return [self.title, self.summary, *(plot.figure for plot in self.plots)]
-
-    def show(self, shown: Motion) -> None:
-        """Draw a run as far as it is done; the rest of the time axis is grey."""
-        beside = {"measured": shown.measured} if self._has_trace else {}
-        self.force.show(force=shown.force, **beside)
-        self.velocity.show(velocity=shown.velocity)
-        self.detached.show(detached=shown.detached)
-        self.slip.show(spring_force=shown.slip_force, contact_force=shown.slip_contact_force)
-        heading = "No slip" if shown.slip_force.is_empty else "The largest slip"
-        set_changed(self.slip.figure.title, text=heading)
+    def show(self, shown: Motion, others: Mapping[str, Motion]) -> None:
+        """Draw a run as far as it is done, and others over it; the rest of the time is grey."""
+        for name in ("force", "velocity", "load", "detached"):
+            lines = {THIS: getattr(shown, name)}
+            lines |= {label: getattr(other, name) for label, other in others.items()}
+            if name == "force":
+                lines[MEASURED] = shown.measured
+            title, _ = TITLES[name]
+            if name == "force" and not shown.force.is_empty:
+                title = shown.force.up.quantity.capitalize()
+            self._plots[name].show(title, lines)
+        slips = {"spring force": shown.slip_force, "contact force": shown.slip_contact_force}
+        slips |= {label: other.slip_force for label, other in others.items()}
+        self._plots["slip"].show(TITLES["slip"][0], slips)
         set_changed(self._range, start=0.0, end=shown.end, reset_start=0.0, reset_end=shown.end)
         reached = shown.force.x[-1] if len(shown.force.x) else 0.0
         set_changed(self._done, left=float(reached), visible=shown.part_done < 1)
-        numbers = ", ".join(f"{name} {value}" for name, value in shown.numbers)
-        set_changed(
-            self.summary, text=f"<b>{html.escape(shown.regime)}</b><br>{html.escape(numbers)}"
-        )
-        self._count += 1
-        self.summary.tags = [self._count]
 
 
 class TheoryView:
     """The force curve of the master equation, and predictions from it."""
 
-    def __init__(self) -> None:
+    def __init__(self, elements: Elements) -> None:
+        self._elements = elements
         self.plot = Plot(
+            elements,
             "curve",
-            "F(X) of slow sliding, and the spring",
-            {"force": FIRST, "slope -K": SECOND},
+            "F(X) of slow sliding",
+            {"force": FIRST, "slope -K": OVER[LIMIT]},
             190,
             x_range=Range1d(start=0, end=1),
             y_range=Range1d(start=0, end=1),
         )
         self._critical = ColumnDataSource({"x": [], "y": []}, name="curve:X_c")
-        self.plot.figure.scatter("x", "y", source=self._critical, size=9, color=SECOND)
-        self.summary = Div(text="", name="theory", sizing_mode="stretch_width")
-        self.roots: list[UIElement] = [self.plot.figure, self.summary]
+        self.plot.figure.scatter("x", "y", source=self._critical, size=9, color=OVER[LIMIT])
+        self.roots: list[UIElement] = [self.plot.figure]
 
     def show(self, shown: Theory) -> None:
         """Draw the curve, and the line of slope -K through X_c."""
-        heading = "No F(X)" if shown.curve.is_empty else "F(X) of slow sliding, and the spring"
-        set_changed(self.plot.figure.title, text=heading)
-        for legend in self.plot.figure.legend:
-            set_changed(legend, visible=not shown.curve.is_empty)
-        self.plot.sources["force"].data = {"x": shown.curve.x, "y": shown.curve.y}
-        self.plot.sources["slope -K"].data = {"x": shown.spring.x, "y": shown.spring.y}
+        title = "F(X) of slow sliding" + ("" if shown.spring.is_empty else ", and the spring")
+        self.plot.show(title, {"force": shown.curve, "slope -K": shown.spring})
         found = [] if shown.critical is None else [shown.critical]
         self._critical.data = {"x": [x for x, _ in found], "y": [y for _, y in found]}
         if not shown.curve.is_empty:
@@ -204,86 +203,94 @@ class TheoryView:
             set_changed(
                 self.plot.figure.x_range, start=0.0, end=end, reset_start=0.0, reset_end=end
             )
-            set_changed(self.plot.figure.xaxis[0], axis_label=shown.curve.x_label)
-            set_changed(self.plot.figure.yaxis[0], axis_label=shown.curve.y_label)
         numbers = ", ".join(f"{name} = {value}" for name, value in shown.numbers)
-        set_changed(self.summary, text=f"{html.escape(numbers)}<br>{html.escape(shown.summary)}")
+        text = ". ".join(one for one in (numbers, shown.summary) if one)
+        self._elements.show("theory", symbols=text)
 
 
 class LatticeView:
     """An animated lattice: the load of each contact, its force over its threshold."""
 
-    def __init__(self, document: Document, now: Span) -> None:
-        self._document, self._now = document, now
+    def __init__(self, elements: Elements, document: Document, now: Span) -> None:
+        self._elements, self._document, self._now = elements, document, now
         self._lattice: Lattice | None = None
+        self._number = 0
         self._beat: Any = None
         self._source = ColumnDataSource(
             {"image": [], "x": [], "y": [], "dw": [], "dh": []}, name="lattice:image"
         )
         mapper = LinearColorMapper(palette="Viridis256", low=0, high=1, nan_color="#bbbbbb")
-        self._figure = figure(
+        picture = figure(
             name="lattice",
-            title="Load of the contacts: force over threshold",
-            height=400,
+            height=360,
             max_width=420,
             sizing_mode="stretch_width",
             match_aspect=True,
             tools="pan,wheel_zoom,reset,save",
         )
-        self._figure.toolbar.logo = None
-        self._figure.toolbar.autohide = True
+        picture.toolbar.logo = None
+        picture.toolbar.autohide = True
+        picture.axis.visible = False
+        picture.grid.visible = False
+        # On any background of the page.
+        picture.border_fill_alpha = picture.background_fill_alpha = 0.0
         look: dict[str, Any] = {"color_mapper": mapper}
-        self._figure.image(source=self._source, **look)
-        self._figure.add_layout(ColorBar(color_mapper=mapper, width=8), "right")
-        self._snapshot = Slider(
-            start=0, end=1, step=1, value=0, title="snapshot", name="snapshot", width=240
-        )
-        self._snapshot.on_change("value", lambda _a, _o, number: self._draw(int(number)))
-        self._moving = Toggle(label="▶ play", name="moving", width=90)
-        self._moving.on_change("active", lambda _a, _o, is_active: self._move(is_active))
-        self._caption = Div(text="", name="lattice:caption", sizing_mode="stretch_width")
-        self.roots: list[UIElement] = [
-            self._figure,
-            self._caption,
-            row(self._moving, self._snapshot, name="lattice:moving"),
-        ]
+        picture.image(source=self._source, **look)
+        bar: dict[str, Any] = {"background_fill_alpha": 0.0, "major_label_text_color": "#7a7a7a"}
+        picture.add_layout(ColorBar(color_mapper=mapper, width=8, **bar), "right")
+        self.roots: list[UIElement] = [picture]
+        self.show(None)
 
     def show(self, lattice: Lattice | None) -> None:
         """Show snapshots, beginning with the last one; nothing without a lattice."""
         self._lattice = lattice
+        self._elements.show("panel:lattice", hidden=lattice is None)
         set_changed(self._now, visible=lattice is not None)
         if lattice is None:
-            set_changed(self._moving, active=False)
-            return
-        last = len(lattice.times) - 1
-        set_changed(self._snapshot, end=max(1, last))
-        if self._snapshot.value != last and not self._moving.active:
-            self._snapshot.value = last
+            self.play(False)
+        elif self._beat is None:
+            self.draw(len(lattice.times) - 1)
         else:
-            self._draw(min(int(self._snapshot.value), last))
+            self.draw(self._number)
 
-    def _draw(self, number: int) -> None:
+    def draw(self, number: int) -> None:
+        """Show a snapshot."""
         lattice = self._lattice
         if lattice is None:
             return
-        number = min(number, len(lattice.times) - 1)
+        last = len(lattice.times) - 1
+        self._number = number = min(number, last)
         loads = lattice.loads[number]
         rows, columns = loads.shape
         data = {"image": [loads], "x": [0], "y": [0], "dw": [columns], "dh": [rows]}
         self._source.data = data
-        caption = f"at {with_unit(float(lattice.times[number]), 's', 4)}; grey: detached"
+        time = with_unit(float(lattice.times[number]), "s", 4)
+        caption = f"at {time}; grey: detached"
         if lattice.avalanches[number]:
             caption += f"; largest avalanche since the last snapshot: {lattice.avalanches[number]}"
-        set_changed(self._caption, text=caption)
+        self._elements.show("lattice:caption", text=caption)
+        detached = 100 * float(np.mean(np.isnan(loads)))
+        words = f"{columns} columns and {rows} rows, {detached:.2g} % detached, mean load of the"
+        words += f" others {float(np.nanmean(loads)) if detached < 100 else 0.0:.2g}"
+        self._elements.show("described:lattice", text=words)
+        self._elements.show("snapshot", max=max(1, last), value=number, valuetext=time)
         set_changed(self._now, location=float(lattice.positions[number]))
 
-    def _move(self, is_active: bool) -> None:
+    @property
+    def is_playing(self) -> bool:
+        """Whether the snapshots follow each other."""
+        return self._beat is not None
+
+    def play(self, is_active: bool) -> None:
+        """Show the snapshots one after another, or stop."""
         if self._beat is not None:
             self._document.remove_periodic_callback(self._beat)
             self._beat = None
         if is_active:
             self._beat = self._document.add_periodic_callback(self._step, FRAME_MILLISECONDS)
+        self._elements.show("moving", text="stop" if is_active else "play", pressed=is_active)
 
     def _step(self) -> None:
         if self._lattice is not None:
-            self._snapshot.value = (int(self._snapshot.value) + 1) % len(self._lattice.times)
+            self.draw((self._number + 1) % len(self._lattice.times))
+            self._elements.send()

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from mesoslip.analysis.regime import regimes, results_of
+from mesoslip.analysis.regime import IRREGULAR, STICK_SLIP, TRANSIENT, regimes, results_of
 from mesoslip.analysis.slips import catalogue_of
 from mesoslip.configuration.config import Config
 from mesoslip.errors import FileError, MesoslipError
-from mesoslip.output.access import group_of
+from mesoslip.output.access import config_of, group_of
 from mesoslip.output.inputs import OutputLike, as_run
 from mesoslip.output.samples import times_of
 from mesoslip.output.tree import build_tree
@@ -24,7 +24,7 @@ from mesoslip.plots.extent import Extent
 from mesoslip.plots.lines import line
 from mesoslip.plots.snapshots import is_on_lattice
 from mesoslip.plots.trace_variables import NAMES, UNITS, force_of
-from mesoslip.quantities import UNKNOWN, Scale, scale_for, with_unit
+from mesoslip.quantities import UNKNOWN, Scale, number, scale_for, with_unit
 from mesoslip.simulation.run_realizations import Results
 from mesoslip.theory.contacts import contact_theory
 from mesoslip.theory.force_curve import ForceCurve
@@ -47,6 +47,8 @@ CURVE_TOLERANCE = 1e-6
 # Force of a measured trace, and means over slips that are compared with it, with their units.
 MEASURED_FORCE = "spring_force"
 COMPARED = {"force_drop": "N", "duration": "s", "waiting_time": "s"}
+# Relative change of a velocity that is none.
+CONSTANT = 1e-9
 # Maximum work for the stability of steady sliding.
 MAX_WORK = 10_000
 # Maximum number of configurations whose theory is kept.
@@ -56,13 +58,66 @@ MAX_SITES = 300
 
 
 @dataclass(frozen=True)
+class Axis:
+    """What a picture shows along an axis, and in which unit."""
+
+    quantity: str
+    unit: Scale
+
+    @property
+    def label(self) -> str:
+        """The label, such as "time (s)"."""
+        return self.unit.label(self.quantity)
+
+
+@dataclass(frozen=True)
 class Line:
     """A line in a picture, in the units of its axes."""
 
     x: Array
     y: Array
-    x_label: str
-    y_label: str
+    along: Axis
+    up: Axis
+
+    @property
+    def x_label(self) -> str:
+        """The label of the horizontal axis."""
+        return self.along.label
+
+    @property
+    def y_label(self) -> str:
+        """The label of the vertical axis."""
+        return self.up.label
+
+    def on(self, other: Line) -> Line:
+        """The line in the units of another one."""
+        if self.is_empty or other.is_empty:
+            return self
+        x, y = (
+            values * (mine.unit.size / axis.unit.size)
+            for values, mine, axis in (
+                (self.x, self.along, other.along),
+                (self.y, self.up, other.up),
+            )
+        )
+        return Line(x, y, other.along, other.up)
+
+    @property
+    def description(self) -> str:
+        """The line in words."""
+        if self.is_empty:
+            return "nothing to draw"
+        known = self.y[np.isfinite(self.y)]
+        low, high, first, last = (
+            f"{number(float(one))} {axis.unit.name}".rstrip()
+            for one, axis in (
+                (known.min(initial=math.inf), self.up),
+                (known.max(initial=-math.inf), self.up),
+                (self.x[0], self.along),
+                (self.x[-1], self.along),
+            )
+        )
+        return f"{self.up.quantity} from {low} to {high}, {self.along.quantity} {first} to {last}"
 
     @property
     def is_empty(self) -> bool:
@@ -70,7 +125,8 @@ class Line:
         return len(self.x) == 0
 
 
-NOTHING = Line(np.empty(0), np.empty(0), "", "")
+NO_AXIS = Axis("", Scale("", 1.0))
+NOTHING = Line(np.empty(0), np.empty(0), NO_AXIS, NO_AXIS)
 
 
 class Measured:
@@ -105,6 +161,7 @@ class Motion:
     force: Line
     velocity: Line
     detached: Line
+    load: Line
     slip_force: Line
     slip_contact_force: Line
     measured: Line
@@ -112,6 +169,9 @@ class Motion:
     end: float
     """End of the time axis, in its unit: that of the run, or earlier if little of it is done."""
     regime: str
+    """The verdict on the motion; empty as long as there is none."""
+    is_judged: bool
+    """Whether the verdict is that of the whole run, which is long enough for one."""
     numbers: tuple[tuple[str, str], ...]
     """Names and values of further results."""
     lattice: Lattice | None
@@ -146,13 +206,20 @@ def motion(results: Results, measured: Measured | None = None) -> Motion:
     if 0 < reached < MIN_PART * end:
         end = reached / MIN_PART
     along = scale_for(end, "s")
-    velocity, detached = (
+    velocity, detached, load = (
         _line(tree, name, extent, extent.window(tree) if len(times) else (0.0, 0.0), along)
-        for name in ("velocity", "detached_contacts")
+        for name in ("velocity", "detached_contacts", "normal_force")
     )
+    if len(velocity.y) and np.ptp(velocity.y) <= CONSTANT * np.max(np.abs(velocity.y)):
+        # Such as that of a slider that moves with the drive.
+        velocity = NOTHING
+    if not detached.y.any():
+        # Without a delay.
+        detached = NOTHING
     force, beside = _forces(tree, measured, extent, end, along)
     close, close_contact = _close_up(tree)
     numbers = [
+        *_extremes(force),
         ("breaks", f"{realization.breaks:.6g}"),
         ("slips", str(tree["slips"].sizes["slip"])),
         ("computing time", with_unit(realization.kernel_seconds, "s", 3)),
@@ -163,21 +230,42 @@ def motion(results: Results, measured: Measured | None = None) -> Motion:
         numbers.insert(1, ("avalanches", str(realization.avalanche_count)))
     if measured is not None:
         numbers += _comparison(tree, measured)
-    summary = results_of(regimes(tree))[0].summary
     return Motion(
         force,
         velocity,
         detached,
+        load,
         close,
         close_contact,
         beside,
         end / along.size,
-        summary if results.complete else f"{summary} (so far)",
+        *_verdict(results, tree),
         tuple(numbers),
         _lattice(tree, along),
         1.0 if results.complete else realization.part_done,
         _progress(results),
     )
+
+
+def _verdict(results: Results, tree: xr.DataTree) -> tuple[str, bool]:
+    """The regime in words, and whether it is final. The beginning of a run shows slips, but not
+    that there are none."""
+    config, found = results.config, results_of(regimes(tree))[0]
+    if math.isinf(config.spring_stiffness):
+        _, _, text = found.summary.partition(": ")
+        complete = results.complete
+        return (f"the slider moves with the drive: {text}" if complete else ""), complete
+    if results.complete:
+        return found.summary, found.regime != TRANSIENT
+    return (f"so far {found.summary}" if found.regime in {STICK_SLIP, IRREGULAR} else ""), False
+
+
+def _extremes(drawn: Line) -> list[tuple[str, str]]:
+    """Minimum and maximum of a line."""
+    if drawn.is_empty:
+        return []
+    low, high = (number(float(one)) for one in (drawn.y.min(), drawn.y.max()))
+    return [(drawn.up.quantity, f"{low} to {high} {drawn.up.unit.name}".rstrip())]
 
 
 def _forces(
@@ -193,11 +281,17 @@ def _forces(
     drawn = [line(one, ("time", which), extent, window) for one, which, window in found]
     scale = scale_for(max((_largest(values) for _, values in drawn), default=0.0), "N")
     lines = [
-        Line(times / along.size, values / scale.size, along.label("time"), scale.label(NAMES[name]))
+        Line(times / along.size, values / scale.size, Axis("time", along), Axis(_name(tree), scale))
         for times, values in drawn
     ]
     beside = lines.pop() if measured is not None else NOTHING
     return (lines[0] if lines else NOTHING), beside
+
+
+def _name(tree: xr.DataTree) -> str:
+    """Name of the force that shows the motion: without a spring, that of the drive."""
+    is_rigid = math.isinf(config_of(tree).spring_stiffness)
+    return "driving force" if is_rigid else NAMES[force_of(tree)]
 
 
 def _comparison(tree: xr.DataTree, measured: Measured) -> list[tuple[str, str]]:
@@ -233,12 +327,12 @@ def _line(
     along: Scale,
 ) -> Line:
     """A variable against time."""
-    if "time" not in tree.coords or tree.sizes["time"] == 0:
+    if "time" not in tree.coords or tree.sizes["time"] == 0 or name not in tree.data_vars:
         return NOTHING
     times, values = line(tree, ("time", name), extent, window)
     scale = scale_for(_largest(values), UNITS[name])
     return Line(
-        times / along.size, values / scale.size, along.label("time"), scale.label(NAMES[name])
+        times / along.size, values / scale.size, Axis("time", along), Axis(NAMES[name], scale)
     )
 
 
@@ -259,9 +353,9 @@ def _close_up(tree: xr.DataTree) -> tuple[Line, Line]:
     ]
     # Two lines on one axis are in one unit.
     scale = scale_for(max(_largest(values) for _, values in lines), "N")
-    labels = along.label(f"time after {with_unit(window[0], 's', 5)}"), scale.label("force")
+    axes = Axis(f"time after {with_unit(window[0], 's', 5)}", along), Axis("force", scale)
     spring, contact = (
-        Line((times - window[0]) / along.size, values / scale.size, *labels)
+        Line((times - window[0]) / along.size, values / scale.size, *axes)
         for times, values in lines
     )
     return spring, contact
@@ -352,8 +446,8 @@ def _curve(
     x = np.unique(np.clip([*np.linspace(0, end, CURVE_POINTS), *marked], samples[0], end))
     force = curve.force(x)
     across, along = scale_for(end, "m"), scale_for(float(np.nanmax(np.abs(force))), "N")
-    labels = across.label("displacement"), along.label("force")
-    drawn = Line(x / across.size, force / along.size, *labels)
+    axes = Axis("displacement", across), Axis("force", along)
+    drawn = Line(x / across.size, force / along.size, *axes)
     numbers = [("K*", with_unit(curve.K_star[0], "N/m", 4))]
     stiffness = config.spring_stiffness
     spring, point = NOTHING, None
@@ -365,5 +459,5 @@ def _curve(
         point = first.displacement / across.size, first.force / along.size
         ends = np.array([0.0, end])
         height = first.force - stiffness * (ends - first.displacement)
-        spring = Line(ends / across.size, height / along.size, *labels)
+        spring = Line(ends / across.size, height / along.size, *axes)
     return drawn, spring, point, tuple(numbers), curve.verdict

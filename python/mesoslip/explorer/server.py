@@ -27,6 +27,7 @@ from tornado.web import HTTPError, RequestHandler
 
 from mesoslip.configuration.config import Config
 from mesoslip.errors import RunError
+from mesoslip.explorer.knobs import with_indices
 from mesoslip.explorer.pictures import Measured
 from mesoslip.explorer.view import Page
 
@@ -48,9 +49,17 @@ POLICY = (
     "style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; connect-src 'self'; "
     "frame-ancestors 'none'; form-action 'none'; base-uri 'none'"
 )
-TEMPLATE = Environment(autoescape=False).from_string(
-    files("mesoslip.explorer").joinpath("page.html").read_text("utf-8")
-)
+
+
+def _part(name: str) -> str:
+    """A part of the page."""
+    return files("mesoslip.explorer").joinpath(name).read_text("utf-8")
+
+
+ENVIRONMENT = Environment(autoescape=False)
+ENVIRONMENT.filters["indices"] = with_indices
+ENVIRONMENT.globals |= {"style": _part("page.css"), "script": _part("page.js")}
+TEMPLATE = ENVIRONMENT.from_string(_part("page.html"))
 
 
 class Pages(Handler):
@@ -106,13 +115,28 @@ class Pages(Handler):
 
     async def _build(self, document: Document) -> None:
         document.template = TEMPLATE
-        page = await asyncio.to_thread(Page, document, self._config, self._source, self._trace)
         context = document.session_context
+        query = [] if context is None else _query(context)
+        page = await asyncio.to_thread(
+            Page, document, self._config, self._source, self._trace, query
+        )
         if context is not None and context.id in self._pages:
             self._pages[context.id] = page
 
     def modify_document(self, doc: Document) -> None:
         """Do nothing: the page was built with its session."""
+
+
+def _query(context: SessionContext) -> list[tuple[str, str]]:
+    """The query of the address of a page, in order."""
+    request = context.request  # type: ignore[attr-defined]
+    arguments = {} if request is None else request.arguments
+    return [
+        (key, value.decode(errors="replace"))
+        for key, values in arguments.items()
+        if not key.startswith("bokeh-")
+        for value in values[-1:]
+    ]
 
 
 class OnlyHere(AuthProvider):

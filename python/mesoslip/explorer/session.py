@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import shlex
+import time
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from mesoslip.configuration.config import Config
@@ -21,8 +23,12 @@ from mesoslip.explorer.controls import (
     lattice_size,
     values,
 )
+from mesoslip.explorer.links import MAX_LINK, Setting, link_of, setting_of
 from mesoslip.explorer.live_run import runnable
 from mesoslip.explorer.stages import EXAMPLE, read_stages, write_stages
+
+# Changes of one key within this time are undone together [s].
+ONE_MOVE = 1.0
 
 
 class Session:
@@ -32,11 +38,18 @@ class Session:
     """
 
     def __init__(self, start: Config, source: str) -> None:
-        self.start = start
+        self._home = Setting(start, source, {})
+        self._history: list[Setting] = []
+        # The setting that is shown, the key that was changed last, and when.
+        self._now, self._recorded_key, self._recorded = -1, "", 0.0
+        self._begin(start, source)
+        self._restored({})
+
+    def _begin(self, start: Config, source: str) -> None:
+        self.start, self.source = start, source
         # The latest configuration that can be run, and values of the controls that apply to it.
         self.config = start
         self.values = self._at_start = values(start)
-        self.source = source
         # Text of each key that was changed, as for ``--set``.
         self.changes: dict[str, str] = {}
         # Errors and other consequences of the last change, by the key of the control that shows
@@ -45,7 +58,57 @@ class Session:
         self.notes: dict[str, str] = {}
         self._before: dict[str, str] = {}
         self._last = ""
+
+    def begin(self, start: Config, source: str, changes: Mapping[str, str] | None = None) -> bool:
+        """Start from another configuration; returns whether it can be run."""
+        self._begin(start, source)
+        return self._restored(changes or {})
+
+    def _restored(self, changes: Mapping[str, str], is_new: bool = True) -> bool:
+        """Take changes from the history, or as a new setting."""
+        self.changes = dict(changes)
+        self._before, self._last, self.notes = dict(changes), "", {}
         self.is_runnable = self._check("")
+        if is_new:
+            self._record("")
+        return self.is_runnable
+
+    def _record(self, key: str) -> None:
+        """Add the setting to the history, or replace the last one of the same move of a knob."""
+        setting = Setting(self.start, self.source, dict(self.changes))
+        now = time.monotonic()
+        if key and key == self._recorded_key and now - self._recorded < ONE_MOVE:
+            self._history[self._now] = setting
+        else:
+            self._now += 1
+            self._history[self._now :] = [setting]
+        self._recorded_key, self._recorded = key, now
+
+    @property
+    def can_undo(self) -> bool:
+        """Whether there is an earlier setting."""
+        return self._now > 0
+
+    @property
+    def can_redo(self) -> bool:
+        """Whether a setting was undone."""
+        return self._now + 1 < len(self._history)
+
+    def undo(self) -> bool:
+        """Return to the setting before; returns whether it can be run."""
+        return self._go(-1) if self.can_undo else self.is_runnable
+
+    def redo(self) -> bool:
+        """Return to the setting that was undone; returns whether it can be run."""
+        return self._go(1) if self.can_redo else self.is_runnable
+
+    def _go(self, step: int) -> bool:
+        self._now += step
+        self._recorded_key = ""
+        start, source, changes = self._history[self._now]
+        if start is not self.start:
+            self._begin(start, source)
+        return self._restored(changes, is_new=False)
 
     def change(self, key: str, text: str) -> bool:
         """Change a key to a value as for ``--set``; the value at the start removes the change.
@@ -65,6 +128,7 @@ class Session:
         is_right = self._check(key)
         if is_right or not self.is_runnable:
             self.is_runnable = is_right
+            self._record(key)
         else:
             self.changes = dict(self._before)
             self.notes = {}
@@ -78,19 +142,36 @@ class Session:
         one."""
         if self.changes == self._before:
             return False
-        self.changes = dict(self._before)
-        self._check("")
-        self.notes = {}
-        self.problems = {self._last: message}
+        last = self._last
+        self._history[self._now :] = []
+        self._now -= 1
+        self._restored(self._before, is_new=self._now < 0)
+        self.problems = {last: message}
         return True
 
     def reset(self) -> bool:
         """Remove all changes; returns whether the configuration at the start can be run."""
-        self._before, self._last = {}, ""
-        self.changes.clear()
-        self.notes = {}
-        self.is_runnable = self._check("")
-        return self.is_runnable
+        return self._restored({})
+
+    @property
+    def link(self) -> str:
+        """The query of an address that gives this setting; empty for that of the program, and for
+        one that is too long.
+
+        It names a ready run, or has the whole configuration at the start, and the changes.
+        """
+        if not self.changes and self.start == self._home.start:
+            return ""
+        query = link_of(Setting(self.start, self.source, self.changes))
+        return query if len(query) <= MAX_LINK else ""
+
+    def follow(self, query: Sequence[tuple[str, str]]) -> None:
+        """Take the setting of a link; an error if it has none that can be run."""
+        setting = setting_of(query, self._home)
+        if not self.begin(*setting):
+            problems = [f"{key}: {text}" if key else text for key, text in self.problems.items()]
+            self.begin(self._home.start, self._home.source)
+            raise FileError("; ".join(problems))
 
     def _lay_over(self, control: Control, text: str) -> None:
         """Add a change to the others, with the keys that it requires."""

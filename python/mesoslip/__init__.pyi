@@ -23,6 +23,7 @@ from .examples import example
 from .execution.executors import Dask, Processes, Threads
 from .inference.fit_trace import fit
 from .inference.predict import compare_fits, predict
+from .inference.rate_tree import response_posterior
 from .measured.trace import read_trace
 from .output.inputs import open_output
 from .output.realization import Realization
@@ -71,6 +72,7 @@ __all__ = [
     "regime",
     "report",
     "response",
+    "response_posterior",
     "run",
     "slips",
     "strokes",

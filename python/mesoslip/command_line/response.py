@@ -2,19 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from mesoslip.command_line.options import (
     JsonOption,
+    QuietOption,
     TableOption,
+    output_option,
     print_json,
     print_table,
     quantity_or_none,
     write_table,
 )
+from mesoslip.command_line.progress import progress_shown, say
+from mesoslip.errors import ConfigError, FileError, Problem
+from mesoslip.execution.stop import StoppedError, stopped_by_signals
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 def response(
@@ -43,6 +52,33 @@ def response(
     as_markdown: Annotated[
         bool, typer.Option("--markdown", help="Print rate-and-state parameters as a Markdown table")
     ] = False,
+    posterior: Annotated[
+        bool,
+        typer.Option(
+            "--posterior",
+            help="Draw rate-and-state parameters and the noise from their posterior, and print "
+            "only these, of one output",
+        ),
+    ] = False,
+    output: Annotated[
+        Path | None,
+        output_option("File of the posterior; out/<stem>.rates.nc by default", "RATES.nc"),
+    ] = None,
+    law: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Law of the posterior, such as slip or 'slip, two states'; may be repeated",
+            metavar="LAW",
+        ),
+    ] = None,
+    samples: Annotated[
+        int | None,
+        typer.Option(help="Draws of the posterior of each law; 4000 by default", metavar="NUMBER"),
+    ] = None,
+    seed: Annotated[
+        int | None, typer.Option(help="Seed of the posterior; 1 by default", metavar="NUMBER")
+    ] = None,
+    quiet: QuietOption = False,
 ) -> None:
     """Print velocity steps, holds, steady forces, rate and state."""
     from mesoslip.analysis.response import (
@@ -59,6 +95,16 @@ def response(
     scale = quantity_or_none(normal_force, "--normal-force", "N", "10 mN", positive=True)
     if table is not None:
         targets.check_writable(table, outputs)
+    own = {"--output": output, "--law": law, "--samples": samples, "--seed": seed}
+    others = {"--normal-force": normal_force, "--no-fit": None if fit else True}
+    _check_options(others if posterior else own, posterior=posterior)
+    if posterior:
+        path = output or Path("out") / f"{outputs[0].stem}.rates.nc"
+        own = {"laws": law, "samples": samples, "seed": seed, "free_stiffness": free_stiffness}
+        options = {name: value for name, value in own.items() if value is not None}
+        sampled = _sampled(outputs, path, quiet, **options)
+        _print_posterior(sampled, table, as_json, as_latex, as_markdown)
+        return
     tree = response_arrays(outputs, normal_force=scale, with_fit=fit, free_stiffness=free_stiffness)
     write_table(table, lambda: tables(tree), lambda file: write_csv(tree, file))
     if as_json:
@@ -79,3 +125,54 @@ def response(
         print_table((one.head, *one.rows), ("", *one.notes))
         if one.line:
             typer.echo(one.line)
+
+
+def _check_options(refused: Mapping[str, object], *, posterior: bool) -> None:
+    """Refuse options that were given, as they need --posterior or do not go with it."""
+    message = "does not go with --posterior" if posterior else "needs --posterior"
+    problems = [
+        Problem("", name, message, value) for name, value in refused.items() if value is not None
+    ]
+    if problems:
+        raise ConfigError(problems)
+
+
+def _sampled(outputs: Sequence[Path], path: Path, quiet: bool, **options: Any) -> xr.DataTree:
+    """The posterior of an output, also written to a file."""
+    from mesoslip.inference.rate_tree import response_posterior
+    from mesoslip.output import targets, writing
+
+    if len(outputs) > 1:
+        raise FileError("--posterior is for one output at a time")
+    targets.check_output(path, outputs)
+    with stopped_by_signals() as stop:
+        try:
+            with progress_shown(quiet, "sampling") as progress:
+                tree = response_posterior(outputs[0], progress=progress, stop=stop, **options)
+        except StoppedError:
+            say(f"{path}: interrupted")
+            raise typer.Exit(stop.exit_status) from None
+    writing.write(tree, path)
+    return tree
+
+
+def _print_posterior(
+    tree: xr.DataTree, table: Path | None, as_json: bool, as_latex: bool, as_markdown: bool
+) -> None:
+    """Print the table of a posterior, assessments of the laws, and warnings."""
+    from mesoslip.inference.rate_tree import rate_table, remarks, rows_of_posterior, write_csv
+    from mesoslip.output.table_files import latex, markdown
+
+    printed, found = rate_table(tree), remarks(tree)
+    write_table(table, lambda: [printed], lambda file: write_csv(tree, file))
+    if as_json:
+        print_json({"rate_and_state_posterior": rows_of_posterior(tree)} | found)
+        return
+    if as_latex or as_markdown:
+        typer.echo((latex if as_latex else markdown)(printed))
+        return
+    print_table((printed.head, *printed.rows))
+    for one in (*found["assessments"], *found["notes"]):
+        typer.echo(one)
+    for one in found["warnings"]:
+        typer.echo(f"warning: {one}")

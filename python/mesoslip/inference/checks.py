@@ -236,6 +236,19 @@ def warnings(
                 f"{one.key} follows from {' and '.join(needed)}; of these the model does not "
                 f"describe {' and '.join(wrong)}, so its interval cannot be relied on"
             )
+    yield from draw_warnings(prior, draws)
+    if np.max(r_hat) > MAX_R_HAT:
+        yield f"the chains do not agree (R-hat {np.max(r_hat):.2f}): increase fit.simulations"
+
+
+def draw_warnings(
+    prior: Prior, draws: Array, advice: str = ": widen fit.free.{}.{}"
+) -> Iterator[str]:
+    """Warnings about parameters by their draws on the unit cube, shape (draws, parameters).
+
+    The advice on a parameter at the end of its range has places for its key and "from" or "to".
+    """
+    shrunk = shrinkage(draws)
     for one, part in zip(prior.free, shrunk, strict=True):
         if part < UNDETERMINED:
             yield f"{one.key} is not determined by this trace: its posterior is close to its prior"
@@ -247,7 +260,7 @@ def warnings(
             ("to", np.mean(draws[:, index] > 1 - MARGIN)),
         ):
             if part > MAX_IN_MARGIN:
-                yield f"{one.key} lies at the end of its range: widen fit.free.{one.key}.{name}"
+                yield f"{one.key} lies at the end of its range{advice.format(one.key, name)}"
     correlation = np.corrcoef(draws.T).reshape(len(prior), -1)
     for first in range(len(prior)):
         for second in range(first + 1, len(prior)):
@@ -257,5 +270,3 @@ def warnings(
                     f"{prior.free[first].key} and {prior.free[second].key} are only determined "
                     f"together (correlation {value:+.2f})"
                 )
-    if np.max(r_hat) > MAX_R_HAT:
-        yield f"the chains do not agree (R-hat {np.max(r_hat):.2f}): increase fit.simulations"

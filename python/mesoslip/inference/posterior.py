@@ -45,7 +45,7 @@ SUMMARIES = Group(
     trace=Meaning("1", "number of the trace", np.int64),
     factor=Meaning("1", "factor of the quantity, in SI"),
 )
-PERCENTILES = (5.0, 25.0, 50.0, 75.0, 95.0)
+PERCENTILES: tuple[float, ...] = (5.0, 25.0, 50.0, 75.0, 95.0)
 VERDICTS = ("not determined", "narrowed", "determined")
 SLIP_COLUMNS = ("start_time", "end_time", "force_before", "force_after")
 # Minimum significant digits of values in a table.
@@ -75,11 +75,15 @@ class Row:
     @property
     def digits(self) -> int:
         """Significant digits that distinguish the ends of the 90 % interval."""
-        low, high = self.percentiles[0], self.percentiles[-1]
-        size = max(abs(low), abs(high))
-        if size == 0 or high <= low:
-            return MIN_DIGITS
-        return max(MIN_DIGITS, 2 + math.ceil(math.log10(size / (high - low))))
+        return interval_digits(self.percentiles[0], self.percentiles[-1])
+
+
+def interval_digits(low: float, high: float) -> int:
+    """Significant digits that distinguish the ends of an interval."""
+    size = max(abs(low), abs(high))
+    if size == 0 or high <= low:
+        return MIN_DIGITS
+    return max(MIN_DIGITS, 2 + math.ceil(math.log10(size / (high - low))))
 
 
 def build_tree(fitted: FitResult) -> xr.DataTree:

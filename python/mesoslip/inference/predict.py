@@ -157,7 +157,7 @@ def as_posterior(posterior: OutputLike) -> xr.DataTree:
     import xarray as xr
 
     tree = posterior if isinstance(posterior, xr.DataTree) else open_output(posterior)
-    if "posterior" not in tree.children:
+    if "summaries" not in tree.children:
         raise FileError(f"{shown(posterior)}: is not the result of a fit")
     return tree
 

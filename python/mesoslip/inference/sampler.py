@@ -22,6 +22,11 @@ def check_installed() -> None:
         raise RunError("a fit needs the package emcee: pip install 'mesoslip[fit]', or make setup")
 
 
+def step_count(chains: int, draws: int) -> int:
+    """Number of steps of all ensembles for a number of draws of each chain."""
+    return chains * (BURN_IN + -(-draws // WALKERS) * THIN)
+
+
 def draw(
     log_density: Callable[[Array], Array],
     start: Array,
@@ -29,11 +34,13 @@ def draw(
     *,
     chains: int,
     draws: int,
+    after_step: Callable[[], None] = lambda: None,
 ) -> Array:
     """Draw from a density on the unit cube by independent ensembles of walkers (emcee).
 
     The result has the shape (chains, draws, parameters). Starting points, of shape (points,
-    parameters), have a density above 0; the logarithm of the density is -inf outside its support.
+    parameters), have a density above 0; the logarithm of the density is -inf outside its support. A
+    function is called after each step of an ensemble (`step_count`).
     """
     import emcee
 
@@ -54,8 +61,9 @@ def draw(
         first[is_out] = chosen[is_out]
         sampler = emcee.EnsembleSampler(WALKERS, size, bounded, vectorize=True)
         sampler.random_state = np.random.RandomState(rng.integers(2**31)).get_state()
-        steps = -(-draws // WALKERS) * THIN
-        sampler.run_mcmc(first, BURN_IN + steps, skip_initial_state_check=True)
+        steps = step_count(1, draws)
+        for _ in sampler.sample(first, iterations=steps, skip_initial_state_check=True):
+            after_step()
         found.append(sampler.get_chain(discard=BURN_IN, thin=THIN).reshape(-1, size)[:draws])
     return np.array(found)
 

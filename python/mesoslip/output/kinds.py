@@ -33,6 +33,7 @@ KINDS = {
     "curve": Kind("a force curve", lambda tree: "slope" in tree.data_vars),
     "onset": Kind("an onset of slip", lambda tree: "stable" in tree.attrs),
     "lyapunov": Kind("a Lyapunov exponent", lambda tree: "lyapunov_exponent" in tree.data_vars),
+    "rates": Kind("a posterior of rates and states", lambda tree: "laws" in tree.attrs),
     "fit": Kind("a fit", lambda tree: "posterior" in tree.children),
 }
 

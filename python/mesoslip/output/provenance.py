@@ -33,6 +33,8 @@ SUMMARIES = {
     "sweep": "Measures of runs of a slider pulled over contacts with random breaking thresholds, "
     "over a range of parameters",
     "trace": "A measured trace of the spring force of a slider, with the slips found in it",
+    "rates": "Rate-and-state parameters of friction with their uncertainty, from a record of the "
+    "force under a drive with steps or holds",
     "fit": "Parameters of the earthquake-like model of multicontact friction with their "
     "uncertainty, from a trace of the spring force",
 }

@@ -25,6 +25,15 @@ SYMBOLS = {
     "slider.layers": "$N_l$",
     "slider.mass": "$M$",
     "slider.stiffness": "$K$",
+    # Parameters of rate-and-state laws.
+    "a": "$a$",
+    "b": "$b$",
+    "b2": "$b_2$",
+    "reference_force": "$F_0$",
+    "slip_distance": "$D_c$",
+    "slip_distance2": "$D_{c,2}$",
+    "noise_share": "correlated share",
+    "noise_time": "correlation time",
 }
 # Names of keys whose last part is ambiguous, and of a measure.
 NAMES = {

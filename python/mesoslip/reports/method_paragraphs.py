@@ -201,6 +201,7 @@ METHODS: dict[str, Callable[[xr.DataTree, Config], Iterator[str]]] = {
     "steady": steady_method,
     "onset": onset_method,
     "lyapunov": lyapunov_method,
+    "rates": lambda tree, _: rates_method(tree),
     "fit": fit_method,
 }
 
@@ -217,8 +218,22 @@ def _estimate(row: Row) -> str:
     return f"{row.key} {median} {shown.scale.name} ({low} to {high})".replace("  ", " ")
 
 
+def rates_method(tree: xr.DataTree) -> Iterator[str]:
+    """A sentence on a posterior of rates and states."""
+    laws = " and ".join(str(tree.attrs["laws"]).split("\n"))
+    yield (
+        "Rate-and-state parameters [@dieterich1979; @ruina1983] were estimated with mesoslip "
+        f"[@mesoslip] from the record of the force: the motion of a slider without inertia by the "
+        f"{laws} law is compared with the record, with normal noise, white and correlated, and "
+        "parameters and noise are drawn by an affine-invariant ensemble sampler [@foreman2013] "
+        "from independent priors, uniform or uniform in the logarithm."
+    )
+
+
 def measured_method(tree: xr.DataTree) -> str:
-    """The method of a measured trace."""
+    """The method of a measured trace, or of a posterior of its rates and states."""
+    if kind_of(tree) == "rates":
+        return " ".join(rates_method(tree))
     source = tree.attrs.get("measured_file", "a file")
     return (
         f"The measured trace ({source}) was analysed with mesoslip [@mesoslip]: slips are falls of "

@@ -1,7 +1,7 @@
 """Rate-and-state friction: laws fitted to records of runs and to measured traces."""
 
 from mesoslip.analysis.rate_and_state.law import LAWS, RateAndState
-from mesoslip.analysis.rate_and_state.noise import known_noise
+from mesoslip.analysis.rate_and_state.noise import NoiseModel, known_noise
 from mesoslip.analysis.rate_and_state.points import (
     Loading,
     Points,
@@ -9,7 +9,7 @@ from mesoslip.analysis.rate_and_state.points import (
     points_of_trace,
 )
 from mesoslip.analysis.rate_and_state.records import Record, records_of
-from mesoslip.analysis.rate_and_state.rows import FIT, fit_rows, fitted_trend
+from mesoslip.analysis.rate_and_state.rows import FIT, assessment, fit_rows, fitted_trend
 from mesoslip.analysis.rate_and_state.search import MAX_MISFIT, Fit, fit_laws, preferred_law
 
 __all__ = [
@@ -18,9 +18,11 @@ __all__ = [
     "MAX_MISFIT",
     "Fit",
     "Loading",
+    "NoiseModel",
     "Points",
     "RateAndState",
     "Record",
+    "assessment",
     "fit_laws",
     "fit_rows",
     "fitted_trend",

@@ -107,6 +107,18 @@ class RateAndState:
         result["a"] = self.scale * result["a"]
         return result
 
+    def scaled(self, values: Array) -> Array:
+        """Scaled parameters of parameters in SI, in the order of `names`, of shape (...,
+        parameters)."""
+        columns = []
+        for name, value in zip(self.names, np.moveaxis(values, -1, 0), strict=True):
+            if name in self._linear:
+                level = self.level if name == "reference_force" else 0.0
+                columns.append((value - level) / self._linear[name])
+            else:
+                columns.append(np.log(value / self.scale if name == "a" else value))
+        return np.stack(columns, axis=-1)
+
     def factors(self, at: Array) -> Array:
         """Derivatives of the parameters in SI by the scaled ones."""
         found = self.parameters(at)

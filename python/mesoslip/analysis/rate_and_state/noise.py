@@ -41,6 +41,8 @@ class Noise:
     divided by it."""
     correlation: Array | None = None
     """Correlation of the points of known noise, which their weights neglect."""
+    share: float = 0.0
+    """Share of the correlated noise in the variance of a sample; not of known noise."""
 
     @property
     def is_known(self) -> bool:
@@ -118,10 +120,80 @@ def averaged_covariance(start: Array, end: Array, length: float) -> Array:
     damped = -np.expm1(-size) / size
     gap = np.maximum(start[:, None], start[None, :]) - np.minimum(end[:, None], end[None, :])
     covariance: Array = np.outer(damped, damped) * np.exp(-np.maximum(gap, 0.0) / length)
-    small = size < 1e-3
-    whole = np.where(small, 1 - size / 3, 2 * (size + np.expm1(-size)) / size**2)
-    np.fill_diagonal(covariance, whole)
+    np.fill_diagonal(covariance, _mean_square(size))
     return covariance
+
+
+def _mean_square(size: Array) -> Array:
+    """Mean square of means of the same process over intervals of lengths over its own."""
+    small = size < 1e-3
+    mean: Array = np.where(small, 1 - size / 3, 2 * (size + np.expm1(-size)) / size**2)
+    return mean
+
+
+@dataclass(frozen=True)
+class NoiseModel:
+    """White noise of the samples and noise with a correlation time, of any size.
+
+    A point is the mean of its samples, which lie between two times.
+    """
+
+    start: Array
+    """Start of each point [s]."""
+    end: Array
+    """End of each point [s]."""
+    count: Array
+    """Samples of each point."""
+    times: tuple[float, float]
+    """Correlation times that the record can show [s]: from the interval of samples to a tenth of
+    the duration."""
+
+    @classmethod
+    def of(cls, points: Points) -> NoiseModel:
+        """The noise of the points of a record."""
+        half = math.sqrt(3) * points.spread
+        longest = MAX_TIME * float(points.time[-1] - points.time[0])
+        shortest = max(points.interval, 1e-6 * longest)
+        return cls(points.time - half, points.time + half, points.count, (shortest, longest))
+
+    def covariance(self, deviation: float, share: float, time: float) -> Array:
+        """Covariance of the points, shape (points, points).
+
+        Given are the standard deviation of a sample, the share of the correlated noise in its
+        variance, and its correlation time [s].
+        """
+        correlated = averaged_covariance(self.start, self.end, time)
+        covariance: Array = deviation**2 * (share * correlated + np.diag((1 - share) / self.count))
+        return covariance
+
+    def log_likelihood(self, residual: Array, deviation: Array, share: Array, time: Array) -> Array:
+        """Logarithm of the normal density of residuals, shape (sets,), by `covariance` without its
+        matrix.
+
+        Residuals have the shape (sets, points), the parameters of the noise (sets,). The
+        correlation decays by one factor from each point to the next: less that of the point before
+        times this factor, residuals are correlated with their neighbours only (tridiagonal).
+        """
+        from scipy.linalg.lapack import dptsv
+
+        length, variance, part = (one[:, None] for one in (time, deviation**2, share))
+        size = np.maximum((self.end - self.start) / length, 1e-9)
+        damped = -np.expm1(-size) / size
+        decay = np.exp(-np.maximum(self.start[1:] - self.end[:-1], 0.0) / length)
+        factor = damped[:, 1:] / damped[:, :-1] * decay * np.exp(-size[:, :-1])
+        diagonal = variance * (part * _mean_square(size) + (1 - part) / self.count)
+        beside = variance * part * damped[:, 1:] * damped[:, :-1] * decay
+        before = diagonal[:, :-1]
+        rest = residual.copy()
+        rest[:, 1:] -= factor * residual[:, :-1]
+        off = beside - factor * before
+        diagonal[:, 1:] += factor * (factor * before - 2 * beside)
+        value = np.full(len(residual), -math.inf)
+        for one in range(len(value)):
+            pivots, _, solved, failed = dptsv(diagonal[one], off[one], rest[one])
+            if failed == 0:
+                value[one] = -0.5 * (np.sum(np.log(pivots)) + rest[one] @ solved)
+        return value
 
 
 def estimated_noise(points: Points, residual: Array, jacobian: Array) -> Noise:
@@ -133,16 +205,14 @@ def estimated_noise(points: Points, residual: Array, jacobian: Array) -> Noise:
     """
     from scipy.optimize import minimize
 
-    half = math.sqrt(3) * points.spread
-    start, end = points.time - half, points.time + half
+    model = NoiseModel.of(points)
     scale = np.linalg.norm(jacobian, axis=0)
     columns = jacobian / np.where(scale > 0, scale, 1.0)
-    longest = MAX_TIME * float(points.time[-1] - points.time[0])
-    shortest = max(points.interval, 1e-6 * longest)
+    shortest, longest = model.times
 
     @lru_cache(maxsize=1)
     def averages(length: float) -> Array:
-        return averaged_covariance(start, end, length)
+        return averaged_covariance(model.start, model.end, length)
 
     def covariance(ratio: float, length: float) -> Array:
         white = np.diag(1 / points.count)
@@ -192,4 +262,5 @@ def estimated_noise(points: Points, residual: Array, jacobian: Array) -> Noise:
     _, ratio, length = best
     variance = likelihood(ratio, length)[1]
     factor = np.linalg.cholesky(variance * covariance(ratio, length))
-    return Noise(math.sqrt((1 + ratio) * variance), length if ratio > 0 else 0.0, factor)
+    deviation, time = math.sqrt((1 + ratio) * variance), length if ratio > 0 else 0.0
+    return Noise(deviation, time, factor, share=ratio / (1 + ratio))

@@ -53,6 +53,7 @@ FIT = Group(
     evolution_chi_square=Meaning("1", "chi square that the evolution of the state explains"),
     is_described=Meaning("1", "whether the law describes the record", np.int8),
     is_preferred=Meaning("1", "whether the record prefers the law to the others", np.int8),
+    verdict=Meaning("1", "described, not described, or not determined", np.str_),
     note=Meaning("1", "assessment of the fit", np.str_),
 )
 
@@ -101,14 +102,17 @@ def fitted_trend(rows: Sequence[dict[str, Any]]) -> float:
 
 
 def _empty_row(number: int, law: str, note: str) -> dict[str, Any]:
-    row = {name: math.nan if one.dtype is np.float64 else 0 for name, one in FIT.items()}
+    row: dict[str, Any] = {
+        name: math.nan if one.dtype is np.float64 else "" if one.dtype is np.str_ else 0
+        for name, one in FIT.items()
+    }
     return row | {"output_index": number, "stage_number": -1, "law": law, "note": note}
 
 
 def _row(number: int, found: Fit, is_preferred: bool) -> dict[str, Any]:
     law, noise = found.law, found.noise
     names = ["reference_force", "stiffness", *(["trend"] if law.with_trend else [])]
-    row = _empty_row(number, law.name, _assessment(found, is_preferred))
+    row = _empty_row(number, law.name, assessment(found, is_preferred=is_preferred))
     # Numbers that noise may have made are none, nor are those beyond the friction.
     if found.is_determined or (noise.is_known and not found.excessive):
         names += ["a", "b", "slip_distance", "a_minus_b"]
@@ -130,6 +134,7 @@ def _row(number: int, found: Fit, is_preferred: bool) -> dict[str, Any]:
         "evolution_chi_square": found.improvement,
         "is_described": int(found.is_described),
         "is_preferred": int(is_preferred),
+        "verdict": found.verdict,
     }
     if noise.deviation > 0:
         row |= {
@@ -139,7 +144,7 @@ def _row(number: int, found: Fit, is_preferred: bool) -> dict[str, Any]:
     return row
 
 
-def _assessment(found: Fit, is_preferred: bool) -> str:
+def assessment(found: Fit, *, is_preferred: bool = False) -> str:
     """A sentence: whether the law describes the record, and the reasons if not."""
     noise, undetermined, misfit = found.noise, found.undetermined, percent(found.relative_misfit)
     names = " and ".join(undetermined) + (" is" if len(undetermined) == 1 else " are")

@@ -37,6 +37,7 @@ MIN_P_VALUE = 0.001
 MAX_MISFIT = 0.01
 # Minimum difference of Akaike's criterion that prefers a law.
 MIN_PREFERENCE = 2.0
+VERDICTS = ("described", "not described", "not determined")
 # Names in sentences.
 SYMBOLS = {"slip_distance": "D_c", "slip_distance2": "D_c2"}
 
@@ -128,11 +129,21 @@ class Fit:
     @property
     def is_described(self) -> bool:
         """Whether the law describes the record: within its noise, or without noise to 1 %."""
-        if not self.is_determined:
-            return False
+        return self.is_determined and self._fits
+
+    @property
+    def _fits(self) -> bool:
         if self.noise.deviation == 0:
             return self.relative_misfit < MAX_MISFIT
         return not self.p_value < MIN_P_VALUE and not self.runs_p_value < MIN_P_VALUE
+
+    @property
+    def verdict(self) -> str:
+        """One of `VERDICTS`."""
+        if self.is_described:
+            return VERDICTS[0]
+        is_judged = self.is_determined or self.noise.is_known
+        return VERDICTS[2] if self._fits or not is_judged else VERDICTS[1]
 
     @property
     def relative_misfit(self) -> float:

@@ -293,7 +293,9 @@ def _columns(
                 _Stiffness("stiffness", "stiffness", stiffness, "stiffness_error"),
                 _Column("misfit", "relative_misfit", "1", digits=2),
                 _Probability("p", "fit_p_value"),
+                _Probability("runs p", "runs_p_value"),
                 _Difference("ΔAIC", "information_criterion", "1", digits=3),
+                _Column("verdict", "verdict"),
             ),
         ),
     }

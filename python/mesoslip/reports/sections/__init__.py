@@ -17,6 +17,7 @@ from mesoslip.reports.sections.methods import methods
 from mesoslip.reports.sections.parameters import parameters
 from mesoslip.reports.sections.pictures import pictures
 from mesoslip.reports.sections.provenance import provenance
+from mesoslip.reports.sections.rates import rates
 from mesoslip.reports.sections.regime import regime
 from mesoslip.reports.sections.response import response
 from mesoslip.reports.sections.slips import slips
@@ -49,6 +50,7 @@ SECTIONS: dict[str, tuple[Writer, ...]] = dict.fromkeys(KINDS, _with()) | {
     "curve": _with(curve),
     "onset": _with(onset),
     "lyapunov": _with(lyapunov),
+    "rates": (rates, methods, provenance),
     "fit": (parameters, methods, configuration, provenance),
 }
 

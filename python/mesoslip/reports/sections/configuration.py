@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from mesoslip.configuration import differences
+from mesoslip.output.kinds import kind_of
 from mesoslip.reports.content import Block, Section, Source, Subject, Table, Text
 from mesoslip.reports.sections.base import named
 
@@ -64,7 +65,7 @@ def _cell(texts: Sequence[str]) -> str:
 
 def _free_keys(subject: Subject) -> dict[str, tuple[float, float]]:
     """The keys that a fit estimates, with the ends of their ranges in SI."""
-    if "posterior" not in subject.tree.children:
+    if kind_of(subject.tree) != "fit":
         return {}
     from mesoslip.inference import posterior
 

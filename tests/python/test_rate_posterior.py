@@ -1,0 +1,219 @@
+"""The posterior of rates and states: its density, its draws, its table and its file."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+
+import mesoslip
+import numpy as np
+import pytest
+from mesoslip.analysis.experiment_stages import Experiment
+from mesoslip.analysis.rate_and_state import Loading, NoiseModel, Points, fit_laws, records_of
+from mesoslip.execution.stop import Stop, StoppedError
+from mesoslip.inference import rate_posterior, rate_tree, sampler
+from mesoslip.inference.rate_posterior import NOISE, Density, sample_laws
+from mesoslip.output import writing
+from test_measured_rates import LAW, UM, trace
+
+# A short record, so that motions are cheap.
+STAGES = [Loading(20, 3 * UM, 3 * UM), Loading(20, 10 * UM, 10 * UM)]
+NAMES = ("a", "b", "slip_distance")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def quick():
+    """Few draws."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(rate_posterior, "CHAINS", 2)
+        patch.setattr(sampler, "WALKERS", 40)
+        patch.setattr(sampler, "BURN_IN", 40)
+        patch.setattr(sampler, "THIN", 3)
+        yield
+
+
+@pytest.fixture(scope="module")
+def record():
+    (one,) = records_of(Experiment(trace(stages=STAGES, noise=1e-4)))
+    return replace(one, laws=("slip",))
+
+
+@pytest.fixture(scope="module")
+def fit(record):
+    return fit_laws(record)["slip"]
+
+
+@pytest.fixture(scope="module")
+def sampled(record):
+    return sample_laws(record, samples=800, seed=2)[0]
+
+
+@pytest.mark.parametrize("time", [1e-3, 0.5, 30.0])
+@pytest.mark.parametrize("share", [0.0, 0.4, 0.999])
+def test_the_density_of_residuals_is_that_of_their_covariance(share, time):
+    """Points of one to many samples, with gaps between them."""
+    rng = np.random.default_rng(1)
+    count = rng.integers(1, 40, 50).astype(float)
+    at = np.cumsum(0.2 * count + rng.exponential(0.3, 50)) - 0.1 * count
+    spread = 0.1 * np.sqrt((count**2 - 1) / 3)
+    model = NoiseModel.of(Points((), at, spread, at, count.astype(int), count, 0.1))
+    residual = 0.02 * rng.standard_normal((2, 50))
+    deviation = np.array([0.01, 0.03])
+    found = model.log_likelihood(residual, deviation, np.full(2, share), np.full(2, time))
+    for one in range(2):
+        covariance = model.covariance(deviation[one], share, time)
+        assert np.linalg.eigvalsh(covariance).min() > 0
+        size = np.linalg.slogdet(covariance)[1]
+        square = residual[one] @ np.linalg.solve(covariance, residual[one])
+        assert found[one] == pytest.approx(-0.5 * (size + square), rel=1e-6)
+
+
+def test_the_density_of_a_nearly_linear_law_is_that_of_least_squares(fit):
+    """With their white noise: one standard error along each axis of the covariance costs 1/2."""
+    density = Density(fit)
+    assert fit.noise.time == 0
+    variances, axes = np.linalg.eigh(fit.covariance)
+    away = np.sqrt(variances)[:, None] * axes.T
+    at = np.concatenate([fit.at[None], fit.at + away, fit.at - away])
+    values = [fit.law.parameters(at)[name] for name in fit.law.names]
+    noise = (fit.noise.deviation * fit.law.scale, 0.0, 1.0)
+    values += [np.full(len(at), one) for one in noise]
+    found = density(density.prior.unit(np.stack(values, axis=-1)))
+    sides = (found[1:] - found[0]).reshape(2, -1)
+    # Priors that are uniform in the logarithm do not change over an error.
+    np.testing.assert_allclose(sides.mean(axis=0), -0.5, atol=0.02)
+    np.testing.assert_allclose(sides, -0.5, atol=0.1)
+
+
+def test_draws_have_the_mean_and_the_width_of_least_squares(sampled):
+    """Wider by the noise, whose correlation is not known."""
+    fit, values = sampled.fit, sampled.values.reshape(-1, len(sampled.prior))
+    for name, column in zip(sampled.prior.keys, values.T, strict=True):
+        if name not in NOISE:
+            assert abs(column.mean() - fit.value(name)) < 0.5 * fit.error(name), name
+            assert 0.8 < column.std() / fit.error(name) < 1.5, name
+    noise = values[:, sampled.prior.keys.index("noise")]
+    assert abs(noise.mean() - 1e-4) < 3 * noise.std()
+    for name in NAMES:
+        low, high = np.percentile(values[:, sampled.prior.keys.index(name)], [0.2, 99.8])
+        assert low < getattr(LAW, name) < high
+
+
+def test_the_same_seed_gives_the_same_draws(record, sampled):
+    again = sample_laws(record, samples=80, seed=2)[0]
+    np.testing.assert_array_equal(again.chains[0, :40], sampled.chains[0, :40])
+    other = sample_laws(record, samples=80, seed=3)[0]
+    assert not np.array_equal(again.chains, other.chains)
+
+
+def test_a_stop_ends_the_draws(record):
+    stop, parts = Stop(), []
+
+    def progress(part):
+        parts.append(part)
+        stop.set()
+
+    with pytest.raises(StoppedError):
+        sample_laws(record, samples=80, seed=1, progress=progress, stop=stop)
+    assert len(parts) == 1
+    assert 0 < parts[0] < 0.1
+
+
+def test_two_state_variables_keep_their_order(record):
+    fits = fit_laws(replace(record, laws=("slip", "slip, two states")))
+    density = Density(fits["slip, two states"])
+    names = density.prior.keys
+    start = density.starts(np.random.default_rng(0))[:1]
+    swapped = start.copy()
+    for one, other in (("b", "b2"), ("slip_distance", "slip_distance2")):
+        first, second = names.index(one), names.index(other)
+        swapped[:, [first, second]] = start[:, [second, first]]
+    assert np.isfinite(density(start))
+    assert density(swapped) == -math.inf
+
+
+@pytest.fixture(scope="module")
+def stored(tmp_path_factory):
+    """A trace of a law of one state in a file, with the record of this law alone."""
+    path = tmp_path_factory.mktemp("rates") / "step.nc"
+    writing.write(trace(stages=STAGES, noise=1e-4), path)
+
+    def records(*given, **options):
+        found = records_of(*given, **options)
+        return found if isinstance(found, str) else [replace(one, laws=("slip",)) for one in found]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(rate_tree, "records_of", records)
+        yield path
+
+
+def test_the_command_prints_and_writes_a_posterior(command, stored):
+    """Each line of the table has the verdict; the file opens as those of fits do."""
+    path, table = stored.with_name("step.rates.nc"), stored.with_suffix(".csv")
+    given = ("--samples", "100", "-o", path, "--table", table, "--quiet")
+    status, out, _ = command("response", stored, "--posterior", *given)
+    assert status == 0
+    lines = [one for one in out.splitlines() if one.lstrip().startswith("slip  ")]
+    assert len(lines) == 9
+    assert all(one.endswith("described") and "not" not in one for one in lines)
+    assert "the stiffness is known: 1000 1/m" in out
+    tree = mesoslip.open_output(path)
+    draws = tree["posterior"].to_dataset()
+    assert dict(draws.sizes) == {"chain": 2, "draw": 50}
+    assert draws["a"].attrs["units"] == "1"
+    assert draws["trend"].attrs["units"] == "m-1"
+    low, high = np.percentile(draws["slip_distance"], [0, 100])
+    assert low < LAW.slip_distance < high
+    assert "a_minus_b" in tree["parameters"]["parameter"].values
+    assert table.read_text().startswith("law [1],parameter [1],unit [1],least_squares [see unit]")
+    picture, page = stored.with_suffix(".png"), stored.with_suffix(".html")
+    assert command("plot", path, "-o", picture)[0] == 0
+    assert command("report", path, "-o", page)[0] == 0
+    assert "Rates and states" in page.read_text()
+    assert command("fit", path, "--predict", stored)[0] == 2
+    # Forces are those of the record within the noise.
+    predicted = tree["posterior_predictive"]["friction_coefficient"].values[0]
+    residual = tree["observed_data"]["friction_coefficient"].values - predicted.mean(axis=0)
+    assert np.sqrt(np.mean(residual**2)) < 2e-4
+
+
+def test_a_posterior_as_json(command, stored):
+    path = stored.with_name("json.nc")
+    given = ("--samples", "100", "-o", path, "--json", "--law", "slip", "--free-stiffness")
+    status, out, _ = command("response", stored, "--posterior", *given)
+    assert status == 0
+    found = json.loads(out)
+    rows = {one["parameter"]: one for one in found["rate_and_state_posterior"]}
+    assert rows["stiffness"]["unit"] == "m-1"
+    assert rows["a"]["percentile_5"] < LAW.a < rows["a"]["percentile_95"]
+    assert rows["a"]["prior"] == "logarithmic"
+    assert {one["verdict"] for one in rows.values()} == {"described"}
+    (assessment,) = found["assessments"]
+    assert assessment.startswith("slip law: describes the record within the noise; preferred")
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        (("--samples", "100"), "needs --posterior"),
+        (("--posterior", "--no-fit"), "does not go with --posterior"),
+        (("--posterior", "--normal-force", "1 N"), "does not go with --posterior"),
+        (("--posterior", "--samples", "3"), "must be a whole number of at least 100"),
+        (("--posterior", "--law", "sleep"), "must be one of 'ageing', 'slip', "),
+        (("--posterior", "-o", "a.csv"), "an output is netCDF"),
+    ],
+)
+def test_wrong_options_are_refused(command, stored, given, message):
+    status, _, error = command("response", stored, *given)
+    assert status == 2
+    assert message in error
+
+
+def test_what_has_no_step_has_no_posterior(command, tmp_path):
+    path = tmp_path / "still.nc"
+    writing.write(trace(stages=[STAGES[0], STAGES[0]]), path)
+    status, _, error = command("response", path, "--posterior", "-o", tmp_path / "a.nc")
+    assert status == 2
+    assert "no step and no hold" in error
+    assert not (tmp_path / "a.nc").exists()

@@ -38,7 +38,7 @@ export PYTHONDONTWRITEBYTECODE :=
 .DELETE_ON_ERROR:
 .PRECIOUS: out/%.nc
 .PHONY: help setup dev demo test test-python test-fortran test-debug test-sanitize test-browser test-formats figures \
-  claims campaign docs docs-examples docs-pages bench fuzz mutants reference lint wheel test-wheel test-sdist clean
+  gallery claims campaign docs docs-examples docs-pages bench fuzz mutants reference lint wheel test-wheel test-sdist clean
 
 help: ## Show the targets
 	@sed -nE 's/^([a-z-]+):.*## (.*)/\1\t\2/p' $(MAKEFILE_LIST) | expand -t 16
@@ -83,6 +83,11 @@ test-browser: $(INSTALLED) ## Test the explorer in a real Chromium, installed if
 
 test-formats: $(INSTALLED) $(FORMATS) ## Read and check outputs with other programs: CF, ArviZ, Zarr, ObsPy
 	OPENBLAS_NUM_THREADS=1 $(VENV)/bin/pytest -q tests/formats
+
+# Some of them, by parts of their names: make gallery PICTURES="sweep lattice".
+PICTURES ?=
+gallery: $(INSTALLED) ## Draw every picture that a command makes, of small runs, into build/gallery
+	$(VENV)/bin/python tests/gallery/gallery.py $(PICTURES)
 
 bench: $(INSTALLED) ## Measure the cost of a contact event
 	$(VENV)/bin/python tests/bench/bench.py

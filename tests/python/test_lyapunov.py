@@ -165,7 +165,10 @@ def test_peaks_are_those_of_the_second_half():
     late = slips["start_time"].values >= 4.0
     assert np.array_equal(settled_peaks(tree), slips["force_before"].values[late])
     assert 0 < late.sum() < late.size
-    assert mesoslip.plot(tree, view="return-map").axes[0].lines
+    (axes,) = mesoslip.plot(tree, view="return-map").axes
+    # Equal axes, with the diagonal from corner to corner.
+    assert axes.get_aspect() == 1
+    assert axes.get_xlim() == axes.get_ylim() == tuple(axes.lines[-1].get_xdata())
     other = mesoslip.run(
         klein_tables(run__duration=2.0, contacts__count=20, drive__velocity=0.4e-6), executor=1
     )

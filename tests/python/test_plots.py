@@ -10,6 +10,7 @@ import mesoslip
 import numpy as np
 import pytest
 import xarray as xr
+from commands import FILES, RUNS, SOURCE
 from conftest import ROOT, long
 from kinds import configuration
 from matplotlib.figure import Figure
@@ -21,10 +22,11 @@ from mesoslip.plots import lines
 from mesoslip.plots.extent import MAX_PARTS, Extent
 from mesoslip.plots.logarithmic import logarithmic
 from mesoslip.plots.style import curve_style, styled
+from mesoslip.plots.sweep_panels import CHOICE_COLORS
 from mesoslip.plots.views import VIEWS, names_of_views
 from mesoslip.plots.views.layers import layer_motion
-from mesoslip.plots.views.sweep import CHOICE_COLORS
 from mesoslip.simulation.run_realizations import run_realizations
+from pictures import MOVIES, PICTURES
 
 pytestmark = pytest.mark.usefixtures("few_replicas")
 
@@ -97,6 +99,20 @@ def test_views_are_complete():
         assert view.options <= options, view.name
         assert view.compare_all is None or view.compare_panel is not None, view.name
         assert view.summary, view.name
+
+
+def test_the_gallery_has_every_view():
+    """``make gallery`` draws each view, each movie and each figure of the source."""
+    drawn = {options[1] for _, options in PICTURES.values() if options[:1] == ("--view",)}
+    commands = {RUNS[name][0] for name in RUNS} | {one.split()[0] for one, _ in FILES.values()}
+    assert {one.name for one in VIEWS if one.name not in OUTPUTS} <= drawn
+    assert {"run", "sweep", "cycle", "curve", "onset", "lyapunov", "fit"} <= commands
+    known = RUNS.keys() | FILES.keys()
+    assert {one for inputs, _ in PICTURES.values() for one in inputs} <= known
+    assert {name for _, name in MOVIES.values()} == {one.name for one in VIEWS if one.movie}
+    assert {f"{one}.toml" for one in SOURCE} <= {
+        path.name for path in (ROOT / "runs/source").glob("*.toml")
+    }
 
 
 PART = {"x": "drive", "end": 0.09}

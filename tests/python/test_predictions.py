@@ -66,8 +66,8 @@ def sweep_over_two_keys(third=None):
 def test_a_map_of_the_regime_has_the_lines_of_theory():
     """Where growth is zero, between two delays, and no panel of its own for what is a line."""
     figure = mesoslip.plot(sweep_over_two_keys())
-    panels = [axes for axes in figure.axes if axes.get_title(loc="left")]
-    assert [axes.get_title(loc="left") for axes in panels] == ["regime"]
+    panels = [axes for axes in figure.axes if axes.get_label() != "<colorbar>"]
+    assert [one.get_ylabel() for one in figure.axes if one not in panels] == ["regime"]
     (line,) = [one for one in panels[0].collections if isinstance(one, ContourSet)]
     (path,) = [one for one in line.get_paths() if len(one.vertices)]
     assert np.all((path.vertices[:, 0] > 1e-3) & (path.vertices[:, 0] < 1e-2))
@@ -117,7 +117,7 @@ def test_lines_pass_where_neighbours_differ_and_nowhere_else(unknown):
 def test_a_third_key_has_a_map_for_each_value():
     figure = mesoslip.plot(sweep_over_two_keys(third=[1e-7, 1e-6]), view="regime")
     titles = [axes.get_title(loc="left") for axes in figure.axes if axes.get_title(loc="left")]
-    assert titles == ["regime; $v_d$ = 1e-7", "regime; $v_d$ = 1e-6"]
+    assert titles == ["$v_d$ = 1e-7", "$v_d$ = 1e-6"]
     with pytest.raises(mesoslip.FileError, match="no measure 'foo'; it has regime, growth_rate"):
         mesoslip.plot(sweep_over_two_keys(), view="foo")
 
@@ -126,7 +126,7 @@ def test_along_one_key_the_lines_of_theory_are_where_they_pass():
     tree = sweep_over_two_keys()
     data = tree.to_dataset().isel({"slider.stiffness": 0})
     figure = mesoslip.plot(xr.DataTree(data))
-    (axes,) = (one for one in figure.axes if one.get_ylabel() == "")
+    (axes,) = (one for one in figure.axes if one.get_ylabel() == "regime")
     vertical = [line for line in axes.lines if len(set(line.get_xdata())) == 1]
     # Growth goes from -1 to 1 between 1 ms and 10 ms, on a logarithmic axis.
     places = {line.get_xdata()[0] for line in vertical if len(line.get_xdata()) == 2}

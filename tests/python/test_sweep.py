@@ -208,7 +208,7 @@ def test_a_map_shows_each_value_where_it_belongs(tmp_path):
         {"configuration": ""},
     )
     figure = mesoslip.plot(data, tmp_path / "map.png")
-    maps = [axes for axes in figure.axes if axes.get_title(loc="left")]
+    maps = panels_of(figure)
     for axes, expected in zip(maps, (force.mean(-1), regime[..., 0]), strict=True):
         mesh = axes.collections[0]
         corners = mesh.get_coordinates()
@@ -221,6 +221,54 @@ def test_a_map_shows_each_value_where_it_belongs(tmp_path):
     line = mesoslip.plot(xr.DataTree(data.isel({"slider.stiffness": 1})))
     np.testing.assert_array_equal(line.axes[0].lines[-1].get_xdata(), sorted(delays))
     np.testing.assert_array_equal(line.axes[0].lines[-1].get_ydata(), [6.5, 10.5, 2.5])
+
+
+def panels_of(figure):
+    """The panels of a picture of a sweep, without colour bars."""
+    return [one for one in figure.axes if one.get_label() != "<colorbar>"]
+
+
+def test_points_over_a_key_have_errors_and_only_rows_that_occur():
+    """The mean with its standard error; a choice that never occurs has no row."""
+    dimensions = ("contacts.delay", "realization")
+    period = np.array([[1.0, 2.0, 3.0], [4.0, 4.0, 4.0], [5.0, 9.0, np.nan], [7.0, 8.0, 9.0]])
+    regime = np.array([[1, 1, 1], [0, 0, 1], [3, 3, 3], [1, 1, 3]])
+    flags = {"flag_meanings": "smooth stick_slip irregular transient"}
+    data = xr.Dataset(
+        {
+            "status": (dimensions, np.zeros((4, 3))),
+            "regime": (dimensions, regime, flags),
+            "period": (dimensions, period, {"units": "s"}),
+        },
+        {"contacts.delay": [1e-4, 2e-4, 5e-4, 3e-4], "realization": [0, 1, 2]},
+        {"configuration": "", "title": "Delays"},
+    )
+    figure = mesoslip.plot(data)
+    words, numbers = figure.axes
+    rows = [one.get_text() for one in words.get_yticklabels()]
+    assert rows == ["smooth", "stick-slip", "transient"]
+    assert numbers.get_ylabel() == "period (s)"
+    (bars,) = numbers.collections
+    heights = [np.ptp(path[:, 1]) / 2 for path in bars.get_segments() if len(path)]
+    np.testing.assert_allclose(heights, [1 / np.sqrt(3), 1 / np.sqrt(3), 2.0])
+    # Open: the delays at which most realizations do not stick and slip.
+    np.testing.assert_allclose(numbers.lines[-1].get_xdata(), [2e-4, 5e-4])
+    title = figure.legends[0].get_title().get_text()
+    assert title == "mean of 3 realizations; bars: standard error; areas: their share"
+    assert figure.get_suptitle() == "Delays"
+
+
+@pytest.mark.parametrize("count", range(1, 7))
+def test_no_part_of_an_overview_is_empty(count):
+    values = ("contacts.delay", "realization"), np.arange(4.0).reshape(2, 2)
+    names = ["status", *(f"measure_{number}" for number in range(count))]
+    data = xr.Dataset(dict.fromkeys(names, values), {"contacts.delay": [1e-4, 2e-4]})
+    rows: dict[int, float] = {}
+    for axes in mesoslip.plot(data.assign_attrs(configuration="")).axes:
+        place = axes.get_subplotspec()
+        share = len(place.colspan) / place.get_gridspec().ncols
+        rows[place.rowspan.start] = rows.get(place.rowspan.start, 0.0) + share
+    assert rows == {row: pytest.approx(1.0) for row in range(len(rows))}
 
 
 def test_lines_of_theory_are_smooth_and_scales_follow_the_data():
@@ -243,7 +291,7 @@ def test_lines_of_theory_are_smooth_and_scales_follow_the_data():
     data["contacts.delay"].attrs["units"] = "s"
     data["slider.stiffness"].attrs["units"] = "N m-1"
     figure = mesoslip.plot(data, width=0.086)
-    regime, waiting, force = (one for one in figure.axes if one.get_title(loc="left"))
+    regime, waiting, force = panels_of(figure)
     (line,) = (one for one in regime.collections if hasattr(one, "levels"))
     x, y = np.concatenate([path.vertices for path in line.get_paths()]).T
     # In milliseconds and kilonewtons per metre. Points are factors of 2.5 and 2.4 apart: cubics
@@ -254,7 +302,18 @@ def test_lines_of_theory_are_smooth_and_scales_follow_the_data():
     assert regime.get_ylabel().replace("\n", " ") == "stiffness of the spring $K$ (kN/m)"
     assert isinstance(waiting.collections[0].norm, mpl.colors.LogNorm)
     assert not isinstance(force.collections[0].norm, mpl.colors.LogNorm)
-    assert waiting.get_title(loc="left") == "mean waiting time (s)"
+    bars = [one.get_ylabel() for one in figure.axes if one.get_label() == "<colorbar>"]
+    assert bars == ["regime", "mean waiting time (s)", "mean force (µN)"]
+    # Smooth points have no waiting time: they are marked, and do not stretch the colours.
+    slips = product[..., 0] <= 0.5
+    assert waiting.collections[0].norm.vmax == pytest.approx(1 / product[..., 0][slips].min())
+    assert waiting.collections[0].norm.vmin == pytest.approx(1 / product[..., 0][slips].max())
+    (marks,) = waiting.lines
+    assert len(marks.get_xdata()) == np.count_nonzero(~slips)
+    assert not force.lines
+    (legend,) = figure.legends
+    assert [one.get_text() for one in legend.get_texts()][-1] == "smooth"
+    assert legend.get_title().get_text() == "one realization of each point"
     figure.draw_without_rendering()
     shown = [one for one in regime.get_xticklabels() if one.get_text()]
     boxes = [one.get_window_extent() for one in shown]

@@ -172,15 +172,16 @@ def _handles(drawn: list[Boundary]) -> list[Line2D]:
     return [Line2D([], [], color="black", linestyle=one.style, label=one.label) for one in drawn]
 
 
-def add_legend(axes: Axes, handles: list[Line2D]) -> None:
+def add_legend(axes: Axes, handles: list[Line2D], title: str) -> None:
     """Put the legend of boundaries below axes and the labels of their axis."""
-    if handles:
-        scale = axes.figure.figure.dpi_scale_trans
-        below = ScaledTranslation(0, -LINES_BELOW * mpl.rcParams["font.size"] / 72, scale)
-        axes.legend(
-            handles=handles,
-            loc="upper left",
-            bbox_to_anchor=(0, 0),
-            bbox_transform=axes.transAxes + below,
-            borderaxespad=0,
-        )
+    scale = axes.figure.figure.dpi_scale_trans
+    below = ScaledTranslation(0, -LINES_BELOW * mpl.rcParams["font.size"] / 72, scale)
+    axes.legend(
+        handles=handles,
+        loc="upper left",
+        bbox_to_anchor=(0, 0),
+        bbox_transform=axes.transAxes + below,
+        borderaxespad=0,
+        title=title,
+        alignment="left",
+    )

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.ticker import LogFormatterSciNotation, LogLocator, MaxNLocator, NullFormatter
 
 from mesoslip.quantities import number
@@ -21,7 +22,11 @@ MIN_LABELS = 3
 def logarithmic(axes: Axes, which: str) -> None:
     """Give axes a logarithmic scale, "x" or "y"."""
     getattr(axes, f"set_{which}scale")("log")
-    axis = getattr(axes, f"{which}axis")
+    label_powers(getattr(axes, f"{which}axis"))
+
+
+def label_powers(axis: Axis) -> None:
+    """Label a logarithmic axis, such as that of a colour bar."""
     axis.set_major_locator(_Locator())
     axis.set_major_formatter(_Formatter())
     axis.set_minor_formatter(NullFormatter())

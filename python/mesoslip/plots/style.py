@@ -36,6 +36,8 @@ POINTS: dict[str, Any] = {"fmt": "o", "color": "black", "markersize": 3}
 CHARACTERS_PER_INCH = 16
 # Width of the ticks and labels beside axes [inch].
 BESIDE_AXES = 0.6
+# Height of the ticks and labels below axes [inch].
+BELOW_AXES = 0.3
 # Maximum number of changed keys that a caption names.
 MAX_KEYS = 6
 
@@ -118,6 +120,16 @@ def axes_width(axes: Axes) -> float:
     ratios: Any = bounds.get_gridspec().get_width_ratios()
     width = 0.9 * sum(ratios[bounds.colspan.start : bounds.colspan.stop]) / sum(ratios) * whole
     return float(min(width, width / 0.9 - BESIDE_AXES))
+
+
+def axes_height(axes: Axes) -> float:
+    """Approximate height of axes without the labels below them [inch]."""
+    bounds, figure = axes.get_subplotspec(), axes.figure
+    whole = figure.bbox.height / figure.figure.dpi
+    if bounds is None:
+        return 0.75 * whole
+    rows: Any = bounds.get_gridspec().nrows
+    return float(max(0.75 * len(bounds.rowspan) / rows * whole - BELOW_AXES, BELOW_AXES))
 
 
 def legend_above(axes: Axes, columns: int = 3, title: str | None = None) -> None:

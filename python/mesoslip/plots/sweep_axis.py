@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from mesoslip.configuration.units import from_cf_units
 from mesoslip.plots.key_names import name_of
 from mesoslip.plots.logarithmic import logarithmic
-from mesoslip.plots.style import BLUE, RED, axes_width, characters
+from mesoslip.plots.style import BLUE, RED, axes_height, axes_width, characters, wrapped
 from mesoslip.quantities import Scale, number, scale_for
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ DIRECTION_STYLES: dict[str, dict[str, Any]] = {
 # Keys whose values span more than this factor have a logarithmic axis.
 LOGARITHMIC_RANGE = 5.0
 # Measures that span more than this factor have logarithmic colours and axes.
-LOGARITHMIC_MEASURE = 30.0
+LOGARITHMIC_MEASURE = 15.0
 # Share of the width of a map that its colour bar takes.
 COLOR_BAR = 0.4
 # Values of an axis of a map up to which each has a label.
@@ -90,7 +90,8 @@ class SweptKey:
 
     def apply(self, axes: Axes, which: str) -> None:
         """Label an axis ("x" or "y") of a panel."""
-        getattr(axes, f"set_{which}label")(self.label)
+        room = axes_width(axes) if which == "x" else axes_height(axes)
+        getattr(axes, f"set_{which}label")(wrapped(self.label, room))
         if self.is_logarithmic:
             logarithmic(axes, which)
         if self.words:

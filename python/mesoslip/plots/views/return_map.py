@@ -6,15 +6,26 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from mesoslip.analysis.return_map import settled_peaks
-from mesoslip.plots.style import BLUE, titles
+from mesoslip.plots.style import BLUE, Canvas, canvas, titles
 from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import scale_for
 
 if TYPE_CHECKING:
     import xarray as xr
+
+# Distance of the peaks from the frame over their range, and maximum number of intervals of an axis.
+MARGIN, TICKS = 0.05, 5
+
+
+def draw(tree: xr.DataTree, options: Options, figure: Canvas | None) -> Canvas:
+    """The return map in a square."""
+    figure = canvas(figure, (3.6, 3.8))
+    draw_panel(figure.subplots(), tree, options)
+    return figure
 
 
 def draw_panel(axes: Axes, tree: xr.DataTree, options: Options) -> None:
@@ -24,13 +35,18 @@ def draw_panel(axes: Axes, tree: xr.DataTree, options: Options) -> None:
 
 
 def draw_map(axes: Axes, peaks: NDArray[np.float64]) -> None:
-    """Draw peaks [N] over the ones before them."""
+    """Draw peaks [N] over the ones before them, on equal axes."""
     scale = scale_for(float(np.max(np.abs(peaks), initial=0.0)) or 1.0, "N")
     shown = peaks / scale.size
     axes.plot(shown[:-1], shown[1:], ".", color=BLUE, markersize=3)
     if shown.size:
-        ends = [shown.min(), shown.max()]
-        axes.plot(ends, ends, color="grey", linewidth=0.7)
+        low, high = float(shown.min()), float(shown.max())
+        margin = MARGIN * (high - low or abs(high) or 1.0)
+        ends = low - margin, high + margin
+        axes.plot(ends, ends, color="grey", linewidth=0.7, zorder=1)
+        axes.set(xlim=ends, ylim=ends, aspect="equal")
+        axes.xaxis.set_major_locator(MaxNLocator(TICKS))
+        axes.yaxis.set_major_locator(MaxNLocator(TICKS))
     axes.set_xlabel(scale.label("peak"))
     axes.set_ylabel(scale.label("next peak"))
 
@@ -39,6 +55,7 @@ VIEW = View(
     name="return-map",
     kind="run",
     summary="each peak of the force over the one before",
+    draw_all=draw,
     panel=draw_panel,
     options=frozenset({"realization"}),
 )

@@ -2,28 +2,28 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import matplotlib as mpl
-import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import BoundaryNorm, ListedColormap, LogNorm
+from matplotlib.colors import Normalize
 from matplotlib.lines import Line2D
-from numpy.typing import NDArray
 
 from mesoslip.errors import FileError
 from mesoslip.plots.boundaries import BOUNDARIES, REGIME, add_legend, draw_contours, draw_crossings
 from mesoslip.plots.key_names import name_of, symbol_or_name
-from mesoslip.plots.logarithmic import logarithmic
-from mesoslip.plots.printing import is_narrow
-from mesoslip.plots.style import BLUE, Canvas, axes_width, canvas, plain, wrapped
-from mesoslip.plots.sweep_axis import (
-    DIRECTION,
-    DIRECTION_STYLES,
-    SweptKey,
-    scale_of,
-    spans_decades,
+from mesoslip.plots.printing import current, is_narrow
+from mesoslip.plots.style import Canvas, canvas, plain, write_title
+from mesoslip.plots.sweep_axis import DIRECTION, SweptKey, scale_of
+from mesoslip.plots.sweep_panels import (
+    Measured,
+    draw_directions,
+    draw_line,
+    draw_map,
+    measured,
+    norm_of,
 )
 from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import number
@@ -31,40 +31,72 @@ from mesoslip.quantities import number
 if TYPE_CHECKING:
     import xarray as xr
 
-Array = NDArray[np.float64]
-
-# Measures of an overview.
-MAX_PANELS = 6
-# Panels in a row, of an overview and of the maps of one measure.
-COLUMNS = 2
+# Measures of an overview, and of one in a column of a journal.
+MAX_PANELS, MAX_NARROW = 6, 3
+# Panels in each row of an overview, by their number, and in a row of maps of one measure.
+ROWS = {0: [1], 1: [1], 2: [2], 3: [3], 4: [2, 2], 5: [3, 2], 6: [3, 3]}
 MAP_COLUMNS = 3
-# Smooth, stick-slip, irregular, transient, which differ in lightness; further choices.
-CHOICE_COLORS = ("#a3cbe5", "#cc6677", "#f5e9b0", "#a5a5a5", "#5aa382", "#84669e")
+# Width and height of a panel [inch].
+PANEL = (3.0, 2.4)
 
 
 def draw(tree: xr.DataTree, options: Options, figure: Canvas | None) -> Canvas:
     """A panel for each of the first measures of a sweep; or one measure, with a panel for each
     value of the first of three dimensions."""
     data = tree.to_dataset()
+    narrow = is_narrow(figure)
     if options.measure is None:
-        panels = [(data, one) for one in measures(data)[:MAX_PANELS]]
+        first = measures(data)[: MAX_NARROW if narrow else MAX_PANELS]
+        panels = [_Panel.of(data, one) for one in first]
+        rows = ROWS[len(panels)]
+        norm = None
     else:
         name = _known(data, options.measure)
-        panels = [(part, name) for part in _parts(data)]
-    columns = min(len(panels), COLUMNS if options.measure is None else MAP_COLUMNS)
-    columns = 1 if is_narrow(figure) else columns
-    rows = -(-len(panels) // columns)
+        panels = [_Panel.of(part, name) for part in _parts(data)]
+        rows = [min(MAP_COLUMNS, len(panels) - at) for at in range(0, len(panels), MAP_COLUMNS)]
+        # Panels of one measure are comparable.
+        norm = None if panels[0].measured.choices else norm_of([one.measured for one in panels])
+    rows = [1] * len(panels) if narrow else rows
     with mpl.rc_context({"axes.spines.top": True, "axes.spines.right": True}):
-        figure = canvas(figure, (max(4.4, 3.4 * columns), 2.5 * rows + 0.4))
-        all_axes = figure.subplots(rows, columns, squeeze=False).ravel()
+        figure = canvas(figure, (max(4.4, PANEL[0] * max(rows)), PANEL[1] * len(rows) + 0.4))
         lines: dict[str, Line2D] = {}
-        for axes, (part, name) in zip(all_axes, panels, strict=False):
-            lines |= {str(one.get_label()): one for one in _draw_measure(axes, part, name)}
-        if lines:
-            figure.legend(handles=list(lines.values()), loc="outside lower left")
-        for axes in all_axes[len(panels) :]:
-            axes.remove()
+        for axes, panel in zip(_axes(figure, rows), panels, strict=True):
+            lines |= {str(one.get_label()): one for one in panel.draw(axes, norm)}
+        if current().title is None and tree.attrs.get("title"):
+            figure.suptitle(plain(tree.attrs["title"]), x=0.01, ha="left")
+        figure.legend(
+            handles=list(lines.values()),
+            loc="outside lower left",
+            title=_about_means([one.measured for one in panels]),
+            alignment="left",
+        )
     return figure
+
+
+def _axes(figure: Canvas, rows: list[int]) -> list[Axes]:
+    """Axes in rows of a number of panels each; a row of fewer panels has wider ones, if it can."""
+    whole = math.lcm(*set(rows)) if sum(rows) <= MAX_PANELS else max(rows)
+    grid = figure.add_gridspec(len(rows), whole)
+    return [
+        figure.add_subplot(grid[row, span * column : span * (column + 1)])
+        for row, count in enumerate(rows)
+        for span in [whole // count if sum(rows) <= MAX_PANELS else 1]
+        for column in range(count)
+    ]
+
+
+def _about_means(panels: list[Measured]) -> str:
+    """The number of realizations, and what error bars are."""
+    count = max(one.realizations for one in panels)
+    if count == 1:
+        return "one realization of each point"
+    parts = [f"mean of {count} realizations"]
+    numbers = [one for one in panels if not one.choices]
+    if numbers and numbers[0].values.ndim == 2:
+        parts.append("bars: standard error")
+    if any(one.choices for one in panels):
+        parts.append("areas: their share" if panels[0].values.ndim == 2 else "the most frequent")
+    return "; ".join(parts) if numbers else f"{count} realizations; {parts[-1]}"
 
 
 def draw_panel(axes: Axes, tree: xr.DataTree, options: Options) -> None:
@@ -75,7 +107,8 @@ def draw_panel(axes: Axes, tree: xr.DataTree, options: Options) -> None:
     """
     data = tree.to_dataset()
     name = measures(data)[0] if options.measure is None else _known(data, options.measure)
-    add_legend(axes, _draw_measure(axes, data, name))
+    panel = _Panel.of(data, name)
+    add_legend(axes, panel.draw(axes), _about_means([panel.measured]))
 
 
 def measures(data: xr.Dataset) -> list[str]:
@@ -92,34 +125,45 @@ def _known(data: xr.Dataset, name: str) -> str:
     return name
 
 
-def _draw_measure(axes: Axes, data: xr.Dataset, name: str) -> list[Line2D]:
-    """Draw a measure; returns lines for a legend, of boundaries or directions."""
-    lines: list[Line2D] = []
-    data, names, fixed = _shown_keys(data)
-    keys = [SweptKey.of(data[one]) for one in names]
-    scale = scale_of(data[name])
-    measure = (data[name] / scale.size).assign_attrs(data[name].attrs)
-    choices = tuple(measure.attrs.get("flag_meanings", "").replace("_", "-").split())
-    if len(keys) == 1:
-        if DIRECTION in data.dims:
-            lines = _draw_directions(axes, measure, keys[0])
+class _Panel(NamedTuple):
+    """A measure along the keys that are drawn; other keys have a fixed value, as in its title."""
+
+    data: xr.Dataset
+    name: str
+    keys: list[SweptKey]
+    is_line: bool
+    fixed: list[str]
+    measured: Measured
+
+    @classmethod
+    def of(cls, data: xr.Dataset, name: str) -> _Panel:
+        data, names, fixed = _shown_keys(data)
+        keys = [SweptKey.of(data[one]) for one in names]
+        scale = scale_of(data[name])
+        found = measured(data, name, scale.label(name_of(name)), scale.size)
+        return cls(data, name, keys, data[names[0]].dims[0] != "sample", fixed, found)
+
+    def draw(self, axes: Axes, norm: Normalize | None = None) -> list[Line2D]:
+        """Draw it; returns lines for a legend, of boundaries, directions or points."""
+        data, keys = self.data, self.keys
+        if len(keys) == 2:
+            lines = draw_map(axes, self.measured, keys, norm)
+            if self.name == REGIME:
+                lines += draw_contours(axes, data, keys)
+        elif DIRECTION in data.dims:
+            lines = draw_directions(axes, data, self.measured, keys[0])
             data = data.isel({DIRECTION: 0})
         else:
-            _draw_dots(axes, measure, keys[0], choices)
-        _scale_values(axes, measure, choices)
-        if name == REGIME:
+            lines = draw_line(axes, self.measured, keys[0], is_line=self.is_line)
+        if len(keys) == 1 and self.name == REGIME:
             lines += draw_crossings(axes, data, keys[0])
-    else:
-        _draw_map(axes, measure, keys, choices)
-        if name == REGIME:
-            lines = draw_contours(axes, data, keys)
-    for key, which in zip(keys, "xy", strict=False):
-        key.apply(axes, which)
-        if len(keys) == 2:
-            key.label_values(axes, which)
-    title = "; ".join([scale.label(name_of(name)), *fixed])
-    axes.set_title(wrapped(title, axes_width(axes)), loc="left")
-    return lines
+        for key, which in zip(keys, "xy", strict=False):
+            key.apply(axes, which)
+            if len(keys) == 2:
+                key.label_values(axes, which)
+        if self.fixed:
+            write_title(axes, "; ".join(self.fixed))
+        return lines
 
 
 def _shown_keys(data: xr.Dataset) -> tuple[xr.Dataset, list[str], list[str]]:
@@ -152,70 +196,6 @@ def _dimensions(data: xr.Dataset) -> list[str]:
     """Dimensions along which keys vary."""
     without = {"realization", DIRECTION}
     return [str(name) for name in data["status"].dims if name not in without]
-
-
-def _draw_directions(axes: Axes, measure: xr.DataArray, key: SweptKey) -> list[Line2D]:
-    """Draw a measure up and down one key, as dots, and as lines through the means, which it
-    returns."""
-    lines = []
-    for direction, style in DIRECTION_STYLES.items():
-        branch = measure.sel({DIRECTION: direction}).transpose(..., "realization")
-        axes.plot(key.values, branch.values, linestyle="", **style)
-        mean = branch.mean("realization").values[key.order]
-        lines += axes.plot(key.values[key.order], mean, linewidth=0.7, label=direction, **style)
-    return lines
-
-
-def _scale_values(axes: Axes, measure: xr.DataArray, choices: tuple[str, ...]) -> None:
-    """Label the choices of a measure on its axis, or choose its scale."""
-    if choices:
-        axes.set_yticks(range(len(choices)), choices)
-        axes.set_ylim(-0.5, len(choices) - 0.5)
-    elif spans_decades(measure.values):
-        logarithmic(axes, "y")
-
-
-def _draw_dots(axes: Axes, measure: xr.DataArray, key: SweptKey, choices: tuple[str, ...]) -> None:
-    values = measure.transpose(..., "realization").values
-    axes.plot(key.values, values, ".", color=BLUE, markersize=3)
-    if not choices and values.shape[1] > 1 and measure.dims[0] != "sample":
-        mean = measure.mean("realization").values
-        axes.plot(key.values[key.order], mean[key.order], color="black")
-
-
-def _draw_map(
-    axes: Axes, measure: xr.DataArray, keys: list[SweptKey], choices: tuple[str, ...]
-) -> None:
-    values = measure.transpose(..., "realization").values
-    shown = _most_frequent(values, len(choices)) if choices else _mean(values)
-    shown = shown[np.ix_(*(key.order for key in keys))].T
-    edges = keys[0].edges, keys[1].edges
-    if not choices:
-        scale = LogNorm() if spans_decades(shown) else None
-        mesh = axes.pcolormesh(*edges, shown, cmap="viridis", norm=scale, rasterized=True)
-        axes.figure.colorbar(mesh, ax=axes)
-        return
-    colors = ListedColormap(CHOICE_COLORS[: len(choices)])
-    norm = BoundaryNorm(np.arange(len(choices) + 1) - 0.5, len(choices))
-    mesh = axes.pcolormesh(*edges, shown, cmap=colors, norm=norm, rasterized=True)
-    bar = axes.figure.colorbar(mesh, ax=axes, ticks=range(len(choices)))
-    bar.ax.set_yticklabels(choices)
-    bar.minorticks_off()
-
-
-def _mean(values: Array) -> Array:
-    """Mean over the last dimension, without missing values; NaN where all are missing."""
-    known = np.isfinite(values)
-    counts = known.sum(axis=-1)
-    sums = np.where(known, values, 0.0).sum(axis=-1)
-    mean: Array = np.divide(sums, counts, out=np.full(sums.shape, np.nan), where=counts > 0)
-    return mean
-
-
-def _most_frequent(values: Array, count: int) -> Array:
-    """The most frequent of some choices over the last dimension; NaN where there are none."""
-    counts = np.stack([np.sum(values == one, axis=-1) for one in range(count)])
-    return np.where(counts.sum(axis=0) > 0, np.argmax(counts, axis=0), np.nan)
 
 
 def _parts(data: xr.Dataset) -> Iterator[xr.Dataset]:

@@ -21,8 +21,8 @@ INTRODUCTION = """\
 The kernels are a Fortran library, which Python uses. Modules are named after their path:
 `fortran/sliders/rigid.f90` is `mesoslip_sliders_rigid`. The pages have their public entities, from
 the comments of the sources; the search leaves them out. Procedures that can fail have an
-allocatable `type(error_type)` as their last argument; unallocated means success. The library never stops the
-program.
+allocatable `type(error_type)` as their last argument; unallocated means success. The library never
+stops the program.
 """
 
 # Front matter of pages that the search of the documentation leaves out.

@@ -231,6 +231,7 @@ def test_commands_import_what_they_need(short, tmp_path, command):
     )
     commands = [
         ["info", str(short)],
+        ["plot", "--help"],
         ["run", str(short), "-o", str(tmp_path / "again.nc"), "--quiet"],
         ["slips", str(output), "--json"],
         ["curve", str(short)],
@@ -245,7 +246,7 @@ def test_commands_import_what_they_need(short, tmp_path, command):
     code = f"""
 import json, sys
 from mesoslip.command_line.main import main
-large = ["dask", "matplotlib", "netCDF4", "pandas", "pint", "xarray"]
+large = ["dask", "matplotlib", "mpl_toolkits.mplot3d", "netCDF4", "pandas", "pint", "xarray"]
 large += [f"scipy.{{one}}" for one in ("integrate", "interpolate", "optimize", "special", "stats")]
 stdout, found = sys.stdout, []
 for arguments in {commands}:
@@ -261,6 +262,7 @@ json.dump(found, stdout)
 """
     done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
     assert json.loads(done.stdout) == [
+        [],
         [],
         ["netCDF4"],
         [],

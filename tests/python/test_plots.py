@@ -14,6 +14,7 @@ from commands import FILES, RUNS, SOURCE
 from conftest import ROOT, long
 from kinds import configuration
 from matplotlib.figure import Figure
+from mesoslip.command_line.view_summaries import summaries
 from mesoslip.output import files
 from mesoslip.output.arrays import Stored
 from mesoslip.output.kinds import KINDS as OUTPUTS
@@ -87,6 +88,12 @@ def test_a_title_that_no_font_has_is_drawn_without_warnings(old, command, tmp_pa
 def test_an_unknown_view_is_an_error(old):
     with pytest.raises(mesoslip.ConfigError, match=r"foo.*choose from run, avalanches, "):
         mesoslip.plot(old, view="foo")
+
+
+def test_help_of_views_is_read_from_their_files():
+    stated = {(one.name, one.kind, one.summary) for one in VIEWS}
+    assert {tuple(one) for one in summaries()} == stated
+    assert [one.kind for one in VIEWS if "measure" in one.options] == ["sweep"]
 
 
 def test_views_are_complete():

@@ -18,6 +18,7 @@ from mesoslip.command_line.options import (
     time_of,
 )
 from mesoslip.command_line.progress import progress_shown
+from mesoslip.command_line.quick_matplotlib import import_matplotlib
 
 # Endings of pictures and movies.
 MOVIES = (".gif", ".mp4")
@@ -26,11 +27,11 @@ VIEW_HELP = "What to draw; each kind of output has a default"
 
 
 class PlotCommand(TyperCommand):
-    """The command, whose help lists the views; they are imported only for that."""
+    """The command, whose help lists the views."""
 
     def complete_help(self) -> None:
         """Add the views to the help of ``--view``."""
-        from mesoslip.plots.views import summary_of_views
+        from mesoslip.command_line.view_summaries import summary_of_views
 
         for option in self.params:
             if isinstance(option, TyperOption) and option.name == "view":
@@ -121,6 +122,8 @@ def plot(
     """Draw an output, or several in one picture."""
     from mesoslip.configuration.reading import is_file
     from mesoslip.output import targets
+
+    import_matplotlib()
     from mesoslip.plots import plot as plots
 
     first = outputs[0]

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from mesoslip.command_line.options import OutputsArgument, output_option
+from mesoslip.command_line.quick_matplotlib import import_matplotlib
 
 
 def report(
@@ -19,6 +20,8 @@ def report(
     """Write a self-contained page about outputs of one command."""
     from mesoslip.configuration.reading import is_file
     from mesoslip.output import targets
+
+    import_matplotlib()
     from mesoslip.reports import report as reports
 
     first = outputs[0]

@@ -30,22 +30,6 @@ def names_of_views(kind: str) -> list[str]:
     return sorted(names, key=lambda name: (name != kind, name))
 
 
-def summary_of_views() -> str:
-    """The views of each kind of output that has several, with what they show."""
-    kinds = []
-    for kind, (description, _) in KINDS.items():
-        names = names_of_views(kind)
-        if len(names) > 1:
-            texts = [
-                f"{name} ({'; '.join(one.summary for one in VIEWS if one.name == name)})"
-                for name in names
-            ]
-            kinds.append(f"Of {description}: {', '.join(texts)}.")
-        elif any("measure" in one.options for one in VIEWS if one.kind == kind):
-            kinds.append(f"Of {description}: the name of a measure.")
-    return " ".join(kinds)
-
-
 def takes_arrays(tree: Tree, name: str | None) -> bool:
     """Whether the view of an output can be drawn without xarray."""
     return any(

@@ -196,7 +196,7 @@ def _has_velocity(tree: Tree) -> bool:
 VIEW = View(
     name="run",
     kind="run",
-    summary=f"force, velocity and detached contacts, {BESIDE}",
+    summary="force, velocity and detached contacts, with the largest slip beside them",
     caption=caption,
     draw_all=draw,
     panel=draw_force,

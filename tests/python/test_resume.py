@@ -126,6 +126,7 @@ def test_what_was_recorded_waits_in_files(tmp_path, monkeypatch):
     from mesoslip.simulation import checkpoint as module
 
     monkeypatch.setattr(module, "MAX_WAITING_BYTES", 1000.0)
+    monkeypatch.setattr(module, "MAX_WAITING_IF_SCARCE", 1000.0)
     config = configuration("rigid, lattice")
     one = Realization(config, 0)
     with Checkpoint(tmp_path, config, interval=0.0) as checkpoint:
@@ -135,6 +136,17 @@ def test_what_was_recorded_waits_in_files(tmp_path, monkeypatch):
             checkpoint.update([one])
             assert sum(rows.waiting_bytes for _, rows in one.waiting) <= 1000
     assert_same(whole("rigid, lattice"), build_tree(Results(config, [one], True, 0.0)))
+
+
+def test_fewer_rows_wait_in_memory_where_it_is_scarce(monkeypatch):
+    from mesoslip.simulation import checkpoint as module
+
+    for free, expected in ((8e9, module.MAX_WAITING_BYTES), (1e9, module.MAX_WAITING_IF_SCARCE)):
+        monkeypatch.setattr(module, "free_memory", lambda free=free: free)
+        assert module.max_waiting_bytes() == expected
+    monkeypatch.setattr(module, "free_memory", lambda: 8e9)
+    monkeypatch.setattr(module, "is_memory_short", lambda _: True)
+    assert module.max_waiting_bytes() == module.MAX_WAITING_IF_SCARCE
 
 
 def test_a_full_disk_does_not_stop_a_run(tmp_path, monkeypatch):

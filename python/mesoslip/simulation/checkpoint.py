@@ -32,6 +32,8 @@ from mesoslip import _build
 from mesoslip.configuration.differences import by_dotted_key
 from mesoslip.errors import FileError
 from mesoslip.execution.store import Folder
+from mesoslip.memory_limit import is_memory_short
+from mesoslip.simulation.memory import free_memory
 from mesoslip.simulation.realization import Realization, Saved
 from mesoslip.simulation.recorded_tables import MAX_SMALL_BYTES, TABLES, RowFile, Rows, Stored
 from mesoslip.simulation.saved_states import NUMBERS, from_arrays, to_arrays
@@ -46,13 +48,22 @@ FORMAT = 2
 INTERVAL = 60.0
 # Time after which a failed write, as on a full disk, is tried again [s].
 RETRY_SECONDS = 10.0
-# Rows in memory above which they are written to the files [bytes].
-MAX_WAITING_BYTES = 64e6
+# Rows in memory above which they are written to the files [bytes], and where memory is scarce.
+# Writing rows twice, and reading them, takes a tenth of a run with fine traces.
+MAX_WAITING_BYTES = 512e6
+MAX_WAITING_IF_SCARCE = 64e6
 
 STATE, PREVIOUS = "state.npz", "state.previous.npz"
 DAMAGED = "damaged."
 ROWS = "{}.rows"
 NAMES = rf"(damaged\.)?state(\.previous)?\.npz|({'|'.join(TABLES)})\.rows"
+
+
+def max_waiting_bytes() -> float:
+    """Rows in memory above which they are written to the files [bytes]."""
+    wanted = int(4 * MAX_WAITING_BYTES)
+    is_scarce = is_memory_short(wanted) or free_memory() < wanted
+    return MAX_WAITING_IF_SCARCE if is_scarce else MAX_WAITING_BYTES
 
 
 class DamagedError(Exception):
@@ -159,7 +170,7 @@ class Checkpoint:
         elif 0 < self._interval <= time.perf_counter() - self._last:
             self._epoch += 1
         is_time = time.perf_counter() - self._last_failure >= RETRY_SECONDS
-        if self._waiting_bytes > MAX_WAITING_BYTES and (is_time or not self._is_failing):
+        if self._waiting_bytes > max_waiting_bytes() and (is_time or not self._is_failing):
             with self._lock:
                 grown = list(self._grown.values())
             self._attempt(lambda: self._flush(grown))

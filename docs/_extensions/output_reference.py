@@ -59,7 +59,7 @@ GROUPS: tuple[tuple[str, Group, str], ...] = (
     (
         "Group noise",
         variables.NOISE,
-        "Noise of a measured trace ([estimates](../../fit.md#noise-of-a-trace)): numbers, and the "
+        "Noise of a measured trace ([estimates](../../traces.md#noise-of-a-trace)): numbers, and the "
         "dimensions `impulse` and `line`.",
     ),
     (

@@ -14,9 +14,8 @@ from scripts import parser_of, reporting_mistakes
 
 
 def main() -> None:
-    parser = parser_of(
-        __doc__, CLAIMS, "claim", "page of verdicts to write, beside it one NAME-measured", None
-    )
+    page = "page of verdicts to write, beside it NAME-measured"
+    parser = parser_of(__doc__, CLAIMS, "claim", page, None)
     parser.add_argument("--json", action="store_true", help="print JSON")
     parser.add_argument(
         "--compare",

@@ -38,7 +38,8 @@ export PYTHONDONTWRITEBYTECODE :=
 .DELETE_ON_ERROR:
 .PRECIOUS: out/%.nc
 .PHONY: help setup dev demo test test-python test-fortran test-debug test-sanitize test-browser test-formats figures \
-  gallery claims campaign docs docs-examples docs-pages bench fuzz mutants reference lint wheel test-wheel test-sdist clean
+  gallery claims campaign docs docs-examples docs-pages bench fuzz mutants reference lint wheel test-wheel test-sdist \
+  release-check clean
 
 help: ## Show the targets
 	@sed -nE 's/^([a-z-]+):.*## (.*)/\1\t\2/p' $(MAKEFILE_LIST) | expand -t 16
@@ -134,6 +135,9 @@ test-wheel: $(WHEEL) ## Test the wheel where neither gfortran nor SUNDIALS can b
 
 test-sdist: $(ENVIRONMENT) ## Build from the source archive of the last commit, without a network
 	PYTHON=$(VENV)/bin/python tools/test-sdist
+
+release-check: lint test docs test-wheel test-sdist ## Check all that a release consists of
+	$(VENV)/bin/python tools/release-check
 
 clean: ## Remove the environment, what was built, and outputs
 	rm -rf build dist out $(VENV) docs/examples docs/reference/generated

@@ -59,8 +59,8 @@ GROUPS: tuple[tuple[str, Group, str], ...] = (
     (
         "Group noise",
         variables.NOISE,
-        "Noise of a measured trace ([estimates](../../fit.md#noise-of-a-trace)): numbers, and the "
-        "dimensions `impulse` and `line`.",
+        "Noise of a measured trace ([estimates](../../traces.md#noise-of-a-trace)): numbers, and "
+        "the dimensions `impulse` and `line`.",
     ),
     (
         "Group slip_traces",

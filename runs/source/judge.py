@@ -8,13 +8,14 @@ from pathlib import Path
 
 from claims import CLAIMS, judge
 from claims.compare import differences
-from claims.page import as_markdown, as_table, as_text
+from claims.page import as_table, as_text, measured_page, measured_path, verdict_page
 from mesoslip.output.targets import check_writable, written_whole
 from scripts import parser_of, reporting_mistakes
 
 
 def main() -> None:
-    parser = parser_of(__doc__, CLAIMS, "claim", "page to write", None)
+    page = "page of verdicts to write, beside it NAME-measured"
+    parser = parser_of(__doc__, CLAIMS, "claim", page, None)
     parser.add_argument("--json", action="store_true", help="print JSON")
     parser.add_argument(
         "--compare",
@@ -27,8 +28,12 @@ def main() -> None:
         check_writable(given.output)
     judgements = judge(given.names, given.outputs)
     if given.output is not None:
-        with written_whole(given.output) as part:
-            part.write_text(as_markdown(judgements), encoding="utf-8")
+        for path, text in (
+            (given.output, verdict_page(judgements, given.output)),
+            (measured_path(given.output), measured_page(judgements)),
+        ):
+            with written_whole(path) as part:
+                part.write_text(text, encoding="utf-8")
     print(json.dumps(as_table(judgements), indent=2) if given.json else as_text(judgements))
     if given.compare is not None:
         found = differences(judgements, given.compare)

@@ -7,6 +7,7 @@ import re
 import runpy
 import subprocess
 import sys
+from pathlib import Path
 
 import mesoslip
 import numpy as np
@@ -14,7 +15,7 @@ import pytest
 import xarray as xr
 from claims import CLAIMS, Verdict, judge
 from claims.compare import differences
-from claims.page import as_markdown, as_table
+from claims.page import as_table, measured_page, measured_path, verdict_page
 from conftest import ROOT
 from figures import FIGURES
 from mesoslip.campaign.sweep_plan import Plan
@@ -68,30 +69,32 @@ def test_every_run_of_claims_is_used():
 
 def test_the_page_has_all_claims_as_they_are():
     """The page of the documentation was written since claims or criteria changed."""
-    page = (ROOT / "docs" / "claims.md").read_text()
+    verdicts = (ROOT / "docs" / "claims.md").read_text()
+    page = measured_path(ROOT / "docs" / "claims.md").read_text()
     assert re.findall(r"^## (C\d+)", page, re.MULTILINE) == list(CLAIMS)
     for claim in CLAIMS.values():
         runs = ", ".join(f"`{run}`" for run in claim.runs)
         assert f"*{claim.statement}.* Criterion: {claim.criterion}. Runs: {runs}." in page
-        assert re.search(rf"^\| \[{claim.name}\]\(#{claim.name.lower()}\) \|", page, re.MULTILINE)
+        link = rf"claims-measured\.md#{claim.name.lower()}"
+        assert re.search(rf"^\| \[{claim.name}\]\({link}\) \|", verdicts, re.MULTILINE)
 
 
 def test_differences_from_an_earlier_page(outputs, tmp_path):
     """Numbers may differ as much as they scatter; verdicts and other numbers may not."""
     judgements = judge(["C1", "C3"], outputs)
-    page = tmp_path / "page.md"
-    text = as_markdown(judgements)
-    page.write_text(text)
+    page, measured = tmp_path / "page.md", tmp_path / "page-measured.md"
+    text = measured_page(judgements)
+    measured.write_text(text)
     assert not differences(judgements, page)
     peak = next(one for one in judgements[1].finding.measured if one.name == "first peak")
     for errors, count in ((1.5, 0), (3.0, 1)):
         other = with_error(peak.mean + errors * peak.spread, peak.spread, "N")
-        page.write_text(text.replace(str(peak), other))
+        measured.write_text(text.replace(str(peak), other))
         found = differences(judgements, page)
         assert len(found) == count, found
-    page.write_text(text.replace("**Holds.**", "**Fails.**").replace("## C1\n", "## C5\n"))
+    measured.write_text(text.replace("**Holds.**", "**Fails.**").replace("## C1\n", "## C5\n"))
     assert [one.split(":")[0] for one in differences(judgements, page)] == ["C1", "C3, verdict"]
-    page.write_text(text.replace("1166 1/s", "1170 1/s").replace("24.46 ms", "24460 µs"))
+    measured.write_text(text.replace("1166 1/s", "1170 1/s").replace("24.46 ms", "24460 µs"))
     assert [one.split(":")[0] for one in differences(judgements, page)] == ["C1, omega_l"]
 
 
@@ -203,9 +206,9 @@ def test_a_viscous_film_is_judged_by_durations_and_drops():
 
 def test_what_is_reported(outputs):
     judgements = judge(["C4", "C14"], outputs)
-    page = as_markdown(judgements)
+    page = verdict_page(judgements, Path("all.md"))
     assert "2 holds with a qualification" in page
-    assert "| [C4](#c4) |" in page
+    assert "| [C4](all-measured.md#c4) |" in page
     printed = as_table(judgements)
     assert json.loads(json.dumps(printed))[0]["measured"][0]["standard_deviation"] < 0.1
     assert len(printed[0]["measured"][0]["values"]) == 3
@@ -240,12 +243,13 @@ def test_the_script_judges(outputs, tmp_path, script):
     status, out, err = script("judge.py", "C4", "--from", outputs, "-o", page)
     assert (status, err) == (0, "")
     assert out.startswith("C4: in a slip")
-    assert "| [C4](#c4) |" in page.read_text()
+    assert "| [C4](claims-measured.md#c4) |" in page.read_text()
     _, out, _ = script("judge.py", "C4", "--from", outputs, "--json")
     assert json.loads(out)[0]["verdict"] == "holds with a qualification"
     status, _, err = script("judge.py", "C4", "--from", outputs, "--compare", page)
     assert (status, err.strip()) == (0, "")
-    page.write_text(page.read_text().replace("**Holds", "**Fails"))
+    measured = measured_path(page)
+    measured.write_text(measured.read_text().replace("**Holds", "**Fails"))
     status, _, err = script("judge.py", "C4", "--from", outputs, "--compare", page)
     assert status == 1
     assert "C4, verdict: Holds with a qualification" in err

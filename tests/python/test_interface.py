@@ -226,7 +226,7 @@ def test_a_rupture_is_the_break_of_half_of_the_pinned_contacts():
     tables["contacts"] |= {"delay": 10.0, "drag": 0.0}
     tables["contacts"]["threshold"]["relative_width"] = 0.001
     one = finished(tables)
-    (rupture,) = one.table("ruptures")
+    (rupture,) = one.records("ruptures")
     assert one.breaks == OF_BLOCK
     assert rupture["breaks"] >= OF_BLOCK - 2
     assert rupture["force_before"] == pytest.approx(CONTACT_STIFFNESS, rel=0.25)
@@ -240,8 +240,8 @@ def test_a_rupture_is_at_the_break_of_half_of_the_contacts_pinned_before_it():
     tables["contacts"]["threshold"]["relative_width"] = 0.5
     tables["output"]["interval"] = 1e-3
     one = finished(tables)
-    (rupture,) = one.table("ruptures")
-    trace = one.table("trace")
+    (rupture,) = one.records("ruptures")
+    trace = one.records("trace")
     pinned = rupture["breaks"]
     assert pinned >= OF_BLOCK / 2
     detached = OF_BLOCK - pinned / 2

@@ -1,6 +1,6 @@
 """Fits of cases whose truth is known, and of traces that the model does not describe.
 
-Prints the tables of ``docs/fit.md``; some minutes of a processor a case::
+Prints the tables of ``docs/fit-accuracy.md``; some minutes of a processor a case::
 
     python tests/studies/fit_cases.py hidden smooth rate_and_state mass
 """

@@ -11,7 +11,7 @@ from mesoslip.errors import FileError
 from mesoslip.quantities import LETTERS, PREFIXED
 
 from claims.base import Judgement
-from claims.page import as_markdown
+from claims.page import measured_page, measured_path
 
 HEADING = re.compile(r"## (C\d+)")
 VERDICT = re.compile(r"\*\*(.+?)\.\*\*")
@@ -39,13 +39,14 @@ class Value(NamedTuple):
 
 
 def differences(judgements: Sequence[Judgement], page: Path) -> list[str]:
-    """Lines on judgements that differ from those of an earlier page."""
+    """Lines on judgements that differ from those measured for an earlier page."""
+    page = measured_path(page)
     try:
         earlier = _tables(page.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
         raise FileError(f"{page}: cannot be read: {error}") from None
     found = []
-    for name, table in _tables(as_markdown(judgements)).items():
+    for name, table in _tables(measured_page(judgements)).items():
         there = earlier.get(name)
         if there is None:
             found.append(f"{name}: is not on {page}")

@@ -1,8 +1,9 @@
-"""Judgements as a page of the documentation, and as plain tables."""
+"""Judgements as two pages of the documentation, and as plain tables."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 from claims.base import Judgement, Verdict
@@ -55,26 +56,42 @@ def as_text(judgements: Sequence[Judgement]) -> str:
     return "\n".join([*lines, summary(judgements)])
 
 
-def as_markdown(judgements: Sequence[Judgement]) -> str:
-    """Judgements as a page."""
+def measured_path(page: Path) -> Path:
+    """The page with what was measured, beside that with the verdicts."""
+    return page.with_stem(f"{page.stem}-measured")
+
+
+def verdict_page(judgements: Sequence[Judgement], page: Path) -> str:
+    """All claims with their verdicts, as a page."""
+    measured = measured_path(page).name
     lines = [
         "# The source's claims, assessed",
         "",
         f"Written by `make claims`. Each claim of the source (`{judgements[0].claim.name}` to "
-        f"`{judgements[-1].claim.name}`) is assessed from runs in",
-        "`runs/source`; values are means and standard deviations over realizations. `make claims`",
-        "compares what it finds with this page: a verdict that differs, or a number that differs",
-        "by more than it scatters, is an error.",
+        f"`{judgements[-1].claim.name}`) is assessed from runs in `runs/source`.",
+        f"[Criteria and measured values]({measured}) are on a page of their own.",
         "",
         f"Summary: {summary(judgements)}.",
         "",
         "| claim | statement | verdict |",
         "|---|---|---|",
         *(
-            f"| [{one.claim.name}](#{one.claim.name.lower()}) | {one.claim.statement} "
+            f"| [{one.claim.name}]({measured}#{one.claim.name.lower()}) | {one.claim.statement} "
             f"| {one.finding.verdict.value} |"
             for one in judgements
         ),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def measured_page(judgements: Sequence[Judgement]) -> str:
+    """The criterion of each claim, and what was measured, as a page."""
+    lines = [
+        "# Claims: criteria and measured values",
+        "",
+        "Values are means and standard deviations over realizations. `make claims`",
+        "compares what it finds with this page: a verdict that differs, or a number that differs",
+        "by more than it scatters, is an error.",
     ]
     for one in judgements:
         lines += [

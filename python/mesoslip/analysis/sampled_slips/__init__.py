@@ -1,7 +1,7 @@
 """Slips in sampled, noisy traces of a force, by a rule without a model.
 
 A slip is a fall of the force that noise does not make, and that is faster than loading. The rule,
-explained in `docs/fit.md`:
+explained in `docs/traces.md`:
 
 - Impulses and hum are removed. Running medians of several widths remove noise and keep steps; that
   is used whose number of slips, times the length of its plateau, is largest.

@@ -20,6 +20,8 @@ from mesoslip.simulation.run_realizations import Results
 # Number of snapshots of a movie, and the fraction of them in the largest slip.
 SNAPSHOTS = 100
 IN_SLIP = 0.7
+# Step of the reports of progress [%].
+REPORTED = 10
 
 
 def movie_of(config: Config, stop: StopRequest, report: Callable[[str], None]) -> bytes | None:
@@ -30,6 +32,16 @@ def movie_of(config: Config, stop: StopRequest, report: Callable[[str], None]) -
     """
     view, wanted = recorded_for_movie(config)
     report("the movie: running …")
+
+    last = 0
+
+    def drawn(part: float) -> None:
+        nonlocal last
+        tens = REPORTED * int(100 * part / REPORTED)
+        if tens > last:
+            last = tens
+            report(f"the movie: {tens} % drawn")
+
     results = finished_run(wanted, stop)
     if results is None:
         return None
@@ -37,10 +49,9 @@ def movie_of(config: Config, stop: StopRequest, report: Callable[[str], None]) -
         results = finished_run(around_slip(wanted, results), stop)
         if results is None:
             return None
-    report("the movie: drawing …")
     with TemporaryDirectory() as folder:
         path = Path(folder) / "movie.gif"
-        plot(build_tree(results), path, view=view)
+        plot(build_tree(results), path, view=view, progress=drawn)
         return path.read_bytes()
 
 

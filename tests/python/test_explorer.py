@@ -61,6 +61,12 @@ RANGES = [one for one in CONTROLS if not one.choices and not one.is_text]
 # Starts with keys that no choice brings.
 THERMAL = ("contacts.coupling=equal", "contacts.thermal.rate=1e4 1/s")
 AT_300_K = ("contacts.thermal.temperature=300 K", "contacts.thermal.activation_length=0.3 nm")
+INTERFACE = (
+    "slider.kind=interface",
+    "slider.blocks=8",
+    "slider.length=10 cm",
+    "slider.bar_stiffness=2000 N/m",
+)
 STARTS = {
     "contacts.thermal.rate": (*THERMAL, "contacts.thermal.force_ratio=0.04"),
     "contacts.thermal.force_ratio": (*THERMAL, "contacts.thermal.force_ratio=0.04"),
@@ -68,6 +74,13 @@ STARTS = {
     "contacts.thermal.activation_length": (*THERMAL, *AT_300_K),
     "slider.layer_damping": ("slider.kind=layered", "slider.layers=4"),
     "contacts.drag": ("contacts.drag_rate=0", "contacts.drag=0.01 N s/m"),
+    "slider.loading": INTERFACE,
+    "slider.top_stiffness": (*INTERFACE, "slider.loading=both", "slider.top_stiffness=1 kN/m"),
+    "run.drive_displacement": ("run.duration=none", "run.drive_displacement=0.4 um"),
+    "drive.cycle.frequency": (
+        "drive.velocity=none",
+        "drive.cycle={amplitude = '0.4 um', frequency = '0.1 1/s', cycles = 2}",
+    ),
     "slider.damping": ("slider.damping_ratio=none", "slider.damping=20 1/s"),
 }
 
@@ -308,6 +321,64 @@ def test_a_lattice_counts_its_contacts_and_goes_again(session):
     assert session.change("interaction.lattice", "none")
     assert session.changes == {}
     assert session.config == session.start
+
+
+def test_the_drive_goes_back_and_forth_and_one_way_again(session):
+    """With strokes in which contacts break; so does a start that has them."""
+    assert session.change("drive.stage", STAGES)
+    assert session.change("drive.cycle", "amplitude")
+    cycle = session.config.drive.cycle
+    assert cycle.velocity == 1e-7
+    loading = 18e-6 / 97 + session.config.contacts.break_stretch
+    assert cycle.amplitude == pytest.approx(2 * loading, rel=0.05)
+    assert {"drive.velocity", "drive.stage"}.isdisjoint(session.shown)
+    assert session.change("drive.cycle.cycles", "1")
+    assert session.change("drive.cycle", "none")
+    assert session.changes == {}
+    there = Session(Config.load(KLEIN, STARTS["drive.cycle.frequency"]), KLEIN)
+    assert there.change("drive.cycle", "none")
+    assert there.config.drive.velocity == pytest.approx(4 * 0.4e-6 * 0.1)
+    assert there.change("drive.cycle", "amplitude")
+    assert there.changes == {}
+
+
+def test_an_interface_is_pulled_at_its_edge_and_from_above(session):
+    assert session.change("slider.kind", "interface")
+    before = dict(session.changes)
+    for loading, edge, top in (("both", 97, 97), ("top", None, 97), ("both", 97, 97)):
+        assert session.change("slider.loading", loading), session.problems
+        slider = session.config.slider
+        assert (slider.stiffness, slider.top_stiffness) == (edge, top)
+    assert session.change("slider.loading", "edge")
+    assert session.changes == before | {"slider.loading": "edge"}
+    assert session.change("slider.blocks", "21")
+    assert session.config.contacts.count == 4074
+    assert session.notes["slider.blocks"] == "N is 4074, a multiple of the blocks"
+    assert not session.change("contacts.count", "4080")
+    assert session.change("slider.blocks", "20")
+    assert session.change("contacts.count", "4080")
+    assert session.change("slider.kind", "rigid")
+    assert session.changes == {}
+    both = Session(example_config("fronts"), "fronts.toml")
+    assert both.change("slider.loading", "edge")
+    assert both.config.slider.top_stiffness is None
+    assert both.change("slider.loading", "both")
+    assert both.changes == {}
+
+
+def test_an_interface_is_drawn_in_space_and_time():
+    """Ruptures are where and when blocks break, and the stress falls there."""
+    config = example_config("interface-me").replace({"run.drive_displacement": "0.02 mm"})
+    seen = []
+    run_live(runnable(config), Stop(), lambda results: seen.append(motion(results)))
+    drawn = seen[-1].interface
+    assert drawn.stress.shape[0] == config.slider.blocks
+    # The first block is pulled, and bears more than the last one; none more than its strength.
+    assert drawn.stress[0].max() > 2 * drawn.stress[-1].max()
+    assert drawn.stress.max() < 1.2
+    assert drawn.duration == pytest.approx(seen[-1].end)
+    assert drawn.length == pytest.approx(25)
+    assert drawn.ruptures.y_label == "position (mm)"
 
 
 def test_contacts_begin_to_age_and_cease_to(session):
@@ -1069,6 +1140,7 @@ FAST_MOVIE = ("run.duration=2.2 s", "contacts.count=400")
             ),
             "lattice",
         ),
+        (INTERFACE, "fronts"),
     ],
 )
 def test_a_run_is_recorded_for_its_movie(changes, view):

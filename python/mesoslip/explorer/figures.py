@@ -14,7 +14,7 @@ from bokeh.models.ui import UIElement
 from bokeh.plotting import figure
 
 from mesoslip.explorer.elements import Elements
-from mesoslip.explorer.pictures import NOTHING, Lattice, Line, Motion, Theory
+from mesoslip.explorer.pictures import NOTHING, Interface, Lattice, Line, Motion, Theory
 from mesoslip.quantities import with_unit
 
 # Time between two snapshots of an animated lattice [ms].
@@ -113,6 +113,58 @@ class Plot:
         self._elements.show(f"described:{self._name}", text=words)
 
 
+class InterfaceView:
+    """An interface in space and time: stress over strength, and the ruptures of blocks."""
+
+    def __init__(self, elements: Elements, x_range: Range1d) -> None:
+        self._elements = elements
+        self._stress = ColumnDataSource(
+            {"image": [], "x": [], "y": [], "dw": [], "dh": []}, name="interface:image"
+        )
+        self._ruptures = ColumnDataSource({"x": [], "y": []}, name="interface:ruptures")
+        self._range = Range1d(start=0, end=1)
+        picture = figure(
+            name="interface",
+            title="Stress over strength along the interface; dots: blocks break",
+            height=240,
+            min_border_left=LEFT,
+            min_border_right=RIGHT,
+            sizing_mode="stretch_width",
+            tools="pan,wheel_zoom,box_zoom,reset,save",
+            x_range=x_range,
+            y_range=self._range,
+        )
+        picture.toolbar.logo = None
+        picture.toolbar.autohide = True
+        picture.axis.axis_label_text_font_style = "normal"
+        mapper = LinearColorMapper(palette="Cividis256", low=0, high=1)
+        look: dict[str, Any] = {"color_mapper": mapper}
+        picture.image(source=self._stress, **look)
+        picture.scatter("x", "y", source=self._ruptures, size=4, color="#e4572e")
+        bar: dict[str, Any] = {"orientation": "horizontal", "height": 6, "width": 240, "padding": 2}
+        picture.add_layout(ColorBar(color_mapper=mapper, **bar), "above")
+        self._figure = picture
+        self.roots: list[UIElement] = [picture]
+
+    def show(self, shown: Interface | None) -> None:
+        """Draw an interface; nothing without one."""
+        self._elements.show("panel:interface", hidden=shown is None)
+        if shown is None:
+            return
+        image = {"image": [shown.stress], "x": [0], "y": [0]}
+        self._stress.data = image | {"dw": [shown.duration], "dh": [shown.length]}
+        drawn = shown.ruptures
+        self._ruptures.data = {"x": drawn.x, "y": drawn.y}
+        set_changed(self._range, start=0.0, end=shown.length, reset_start=0.0)
+        set_changed(self._range, reset_end=shown.length)
+        set_changed(self._figure.xaxis[0], axis_label=drawn.x_label)
+        set_changed(self._figure.yaxis[0], axis_label=drawn.y_label)
+        words = f"{shown.stress.shape[0]} blocks, {len(drawn.x)} ruptures of blocks"
+        if not drawn.is_empty:
+            words += f"; {drawn.description}"
+        self._elements.show("described:interface", text=words)
+
+
 # Titles of the pictures of a run, and their heights.
 TITLES = {
     "force": ("Force", 210),
@@ -146,7 +198,9 @@ class MotionView:
         force.add_layout(self.now)
         self._done = BoxAnnotation(left=0, fill_color="#888888", fill_alpha=0.12, visible=False)
         force.add_layout(self._done)
-        self.roots: list[UIElement] = [plot.figure for plot in self._plots.values()]
+        self._interface = InterfaceView(elements, self._range)
+        plots = [plot.figure for plot in self._plots.values()]
+        self.roots: list[UIElement] = [*plots, *self._interface.roots]
 
     def show(self, shown: Motion, others: Mapping[str, Motion]) -> None:
         """Draw a run as far as it is done, and others over it; the rest of the time is grey."""
@@ -162,6 +216,7 @@ class MotionView:
         slips = {"spring force": shown.slip_force, "contact force": shown.slip_contact_force}
         slips |= {label: other.slip_force for label, other in others.items()}
         self._plots["slip"].show(TITLES["slip"][0], slips)
+        self._interface.show(shown.interface)
         set_changed(self._range, start=0.0, end=shown.end, reset_start=0.0, reset_end=shown.end)
         reached = shown.force.x[-1] if len(shown.force.x) else 0.0
         set_changed(self._done, left=float(reached), visible=shown.part_done < 1)

@@ -27,8 +27,9 @@ REPORTED = 10
 def movie_of(config: Config, stop: StopRequest, report: Callable[[str], None]) -> bytes | None:
     """A movie of a run as a GIF; None if it was stopped.
 
-    On a lattice it shows the load of each contact, of an elastic slider its layers, and otherwise
-    the stretches of the contacts. Messages on its progress are reported.
+    On a lattice it shows the load of each contact, of an elastic slider its layers, of an interface
+    its largest event, and otherwise the stretches of the contacts. Messages on its progress are
+    reported.
     """
     view, wanted = recorded_for_movie(config)
     report("the movie: running …")
@@ -60,6 +61,8 @@ def recorded_for_movie(config: Config) -> tuple[str, Config]:
     wanted = explored(config)
     if wanted.contact_kind.on_lattice:
         return "lattice", wanted
+    if wanted.slider.block_count > 1:
+        return "fronts", wanted
     if wanted.slider.layer_count > 1:
         return "layers", wanted.replace({"output.layers": True})
     if not wanted.contact_kind.is_discrete:

@@ -155,6 +155,18 @@ class Lattice:
 
 
 @dataclass(frozen=True)
+class Interface:
+    """An interface in space and time, in the units of its axes: the force on the contacts of each
+    block over their strength, shape (blocks, times), at equal intervals of time up to the last, and
+    time and position at which half the contacts of a block have broken."""
+
+    stress: NDArray[np.float32]
+    duration: float
+    length: float
+    ruptures: Line
+
+
+@dataclass(frozen=True)
 class Motion:
     """A run, as far as it is done: lines over time, those of its largest slip, and results."""
 
@@ -175,6 +187,7 @@ class Motion:
     numbers: tuple[tuple[str, str], ...]
     """Names and values of further results."""
     lattice: Lattice | None
+    interface: Interface | None
     part_done: float
     progress: str
     """The part that is done in words, with the time that the rest takes."""
@@ -242,6 +255,7 @@ def motion(results: Results, measured: Measured | None = None) -> Motion:
         *_verdict(results, tree),
         tuple(numbers),
         _lattice(tree, along),
+        _interface(tree, along, reached),
         1.0 if results.complete else realization.part_done,
         _progress(results),
     )
@@ -380,6 +394,27 @@ def _lattice(tree: xr.DataTree, along: Scale) -> Lattice | None:
     largest = np.zeros(len(times) + 1, dtype=np.int64)
     np.maximum.at(largest, position, catalogue["size"].values.astype(np.int64))
     return Lattice(times, times / along.size, loads, largest[:-1])
+
+
+def _interface(tree: xr.DataTree, along: Scale, reached: float) -> Interface | None:
+    if "blocks" not in tree.children or not reached:
+        return None
+    config = config_of(tree)
+    blocks, spacing = config.slider.block_count, config.slider.block_spacing
+    across = scale_for(blocks * spacing, "m")
+    wanted = np.linspace(0.0, reached, min(PARTS, tree.sizes["time"]))
+    chosen = np.unique(np.searchsorted(times_of(tree), wanted).clip(max=tree.sizes["time"] - 1))
+    forces = group_of(tree, "blocks")["block_contact_force"].isel(realization=0, time=chosen).values
+    data = group_of(tree, "ruptures")
+    places = (data["block_number"].values - 0.5) * spacing
+    ruptures = Line(
+        data["rupture_time"].values / along.size,
+        places / across.size,
+        Axis("time", along),
+        Axis("position", across),
+    )
+    stress = (forces.T * (blocks / config.contacts.static_force)).astype(np.float32)
+    return Interface(stress, reached / along.size, blocks * spacing / across.size, ruptures)
 
 
 class Theories:

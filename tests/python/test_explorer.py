@@ -513,6 +513,34 @@ def test_pictures_are_as_long_as_a_picture_is_wide():
     assert np.min(np.abs(drawn.slip_contact_force.y)) < 0.1
 
 
+def test_strokes_are_loops_whose_area_is_the_work_of_the_drive():
+    """Whole cycles of a prescribed slider; one direction has no loop."""
+    config = example_config("pre-sliding")
+    seen = []
+    run_live(explored(config), Stop(), lambda results: seen.append((results, motion(results))))
+    results, drawn = seen[-1]
+    assert (drawn.loop.x_label, drawn.loop.y_label) == ("displacement (nm)", "driving force (µN)")
+    assert drawn.loop.x.max() == pytest.approx(2.7, rel=1e-3)
+    area = np.trapezoid(drawn.loop.y, drawn.loop.x) * 1e-15
+    (realization,) = results.realizations
+    tree = build_tree(results)
+    work = float(np.trapezoid(tree["spring_force"].values[0], tree["drive_displacement"].values[0]))
+    assert realization.finished
+    assert area == pytest.approx(work, rel=0.01)
+    assert drawn.loop.description.startswith("driving force from -")
+
+
+def test_stages_that_end_before_the_run_are_reported():
+    page, _ = page_of()
+    try:
+        ask(page, "set", "drive.stage", "2 s at 0.1 um/s; hold 1 s")
+        assert page.elements["notes"]["text"].startswith("the stages end after 3 s")
+        ask(page, "undo")
+        assert page.elements["notes"]["text"] == ""
+    finally:
+        page.close()
+
+
 def test_the_line_of_the_spring_touches_the_curve():
     shown = theory(Config.load(KLEIN))
     x, y = shown.critical
@@ -1157,6 +1185,10 @@ def test_a_run_is_recorded_for_its_movie(changes, view):
         times = np.array(around.output.snapshots)
         assert np.sum((times >= low) & (times <= high)) >= 70
         assert len(times) <= 100
+    if view == "layers":
+        (slip,) = [largest_slip(build_tree(results))]
+        low, high = slip_window(slip)
+        assert around_slip(wanted, results).output.interval <= 1.01 * (high - low) / 100
 
 
 def test_a_movie_is_made_or_the_key_is_named(monkeypatch):

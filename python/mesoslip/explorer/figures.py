@@ -171,6 +171,7 @@ TITLES = {
     "velocity": ("Velocity", 175),
     "load": ("Normal force", 175),
     "detached": ("Detached contacts", 175),
+    "loop": ("Force against the displacement of the slider", 175),
     "slip": ("The largest slip", 190),
 }
 
@@ -192,7 +193,8 @@ class MotionView:
                 colors = {MEASURED: OVER[MEASURED]} | colors
             if is_slip:
                 colors = {"contact force": CONTACT} | colors
-            style: dict[str, Any] = {} if is_slip else {"x_range": self._range}
+            is_over_time = name not in {"loop", "slip"}
+            style: dict[str, Any] = {"x_range": self._range} if is_over_time else {}
             self._plots[name] = Plot(elements, name, title, colors, height, **style)
         force = self._plots["force"].figure
         force.add_layout(self.now)
@@ -204,7 +206,7 @@ class MotionView:
 
     def show(self, shown: Motion, others: Mapping[str, Motion]) -> None:
         """Draw a run as far as it is done, and others over it; the rest of the time is grey."""
-        for name in ("force", "velocity", "load", "detached"):
+        for name in ("force", "velocity", "load", "detached", "loop"):
             lines = {THIS: getattr(shown, name)}
             lines |= {label: getattr(other, name) for label, other in others.items()}
             if name == "force":

@@ -174,6 +174,8 @@ class Motion:
     velocity: Line
     detached: Line
     load: Line
+    loop: Line
+    """The force against the displacement of the slider, if the drive goes back and forth."""
     slip_force: Line
     slip_contact_force: Line
     measured: Line
@@ -248,6 +250,7 @@ def motion(results: Results, measured: Measured | None = None) -> Motion:
         velocity,
         detached,
         load,
+        _loop(tree, extent, force),
         close,
         close_contact,
         beside,
@@ -259,6 +262,15 @@ def motion(results: Results, measured: Measured | None = None) -> Motion:
         1.0 if results.complete else realization.part_done,
         _progress(results),
     )
+
+
+def _loop(tree: xr.DataTree, extent: Extent, force: Line) -> Line:
+    directions = {one for part in config_of(tree).drive_parts for one in part.directions}
+    if len(directions) < 2 or force.is_empty:
+        return NOTHING
+    x, y = line(tree, ("displacement", force_of(tree)), extent, extent.window(tree))
+    across = scale_for(_largest(x), "m")
+    return Line(x / across.size, y / force.up.unit.size, Axis("displacement", across), force.up)
 
 
 def _verdict(results: Results, tree: xr.DataTree) -> tuple[str, bool]:

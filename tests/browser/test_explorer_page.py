@@ -141,6 +141,7 @@ def test_a_program_that_has_ended_is_reported(browser):
 
 # Keys that no choice brings: only a file that has them.
 OF_A_FILE = {
+    "contacts.drag",
     "slider.damping",
     "slider.layer_damping",
     "drive.cycle.frequency",

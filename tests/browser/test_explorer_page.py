@@ -305,7 +305,7 @@ def test_a_keyboard_reaches_what_a_mouse_does(server, browser):
     # The pictures in words, and the results as a table.
     assert browser.text("described:force").startswith("this run: spring force from -")
     names = [one.text for one in browser.element("results").find_elements(By.TAG_NAME, "th")]
-    assert names[:3] == ["spring force", "breaks", "slips"]
+    assert names[:3] == ["force", "breaks", "slips"]
     assert (
         browser.driver.execute_script(
             "return getComputedStyle(document.activeElement).outlineStyle"

@@ -41,6 +41,9 @@ from mesoslip.explorer.movies import (
     recorded_for_movie,
 )
 from mesoslip.explorer.pictures import (
+    NOTHING,
+    Axis,
+    Line,
     Measured,
     Theories,
     curve_alone,
@@ -52,7 +55,7 @@ from mesoslip.explorer.stages import read_stages
 from mesoslip.output.tree import build_tree
 from mesoslip.plots.close_up import largest_slip, slip_window
 from mesoslip.plots.movie import chosen_frames
-from mesoslip.quantities import with_unit
+from mesoslip.quantities import scale_for, with_unit
 from mesoslip.simulation.realization import Realization
 from mesoslip.simulation.run_realizations import Results, run_realizations
 
@@ -539,6 +542,57 @@ def test_stages_that_end_before_the_run_are_reported():
         assert page.elements["notes"]["text"] == ""
     finally:
         page.close()
+
+
+def test_a_slider_that_moves_with_the_drive_is_not_said_to_slip_or_to_slide_smoothly():
+    """The beginning of a run is not judged but by its slips."""
+    parts = []
+
+    def verdict(*changes):
+        parts.clear()
+        config = explored(Config.load(KLEIN, changes))
+        run_live(config, Stop(), lambda results: parts.append(motion(results)))
+        return parts[-1].regime
+
+    text = verdict("slider.kind=prescribed", "run.duration=2 s")
+    assert text.startswith("the slider moves with the drive: force amplitude 3")
+    assert parts[-1].is_judged
+    assert parts[-1].velocity.is_empty
+    assert parts[-1].slip_force.is_empty
+    assert parts[-1].force.up.quantity == "driving force"
+    few = verdict("slider.kind=prescribed", "run.duration=0.1 s")
+    assert "longer" not in few
+    assert "longer duration" in verdict("run.duration=1 s")
+    assert not parts[-1].is_judged
+    realization = Realization(explored(Config.load(KLEIN)), 0)
+    realization.advance(work=5_000)
+    drawn = motion(Results(realization.config, [realization], False, 1.0))
+    realization.close()
+    assert (drawn.regime, drawn.is_judged) == ("", False)
+
+
+def test_curves_of_other_units_lie_on_the_axes_of_the_run():
+    """Forces in the largest unit, times in that of the run; also where the run has no curve."""
+    Plot = pytest.importorskip("mesoslip.explorer.figures").Plot  # noqa: N806
+    from mesoslip.explorer.elements import Elements
+
+    elements = Elements(lambda *_: None)
+    plot = Plot(elements, "force", "", {"this run": "black", "pinned": "red"})
+    along, slow = Axis("time", scale_for(1.0, "s")), Axis("time", scale_for(1e-3, "s"))
+    weak, strong = (Axis("force", scale_for(size, "N")) for size in (1e-6, 1.0))
+    mine = Line(np.array([0.0, 2.0]), np.array([0.0, 3.0]), along, weak)
+    other = Line(np.array([0.0, 500.0]), np.array([0.0, 4.0]), slow, strong)
+    plot.show("", {"this run": mine, "pinned": other}, along)
+    assert list(plot.sources["pinned"].data["x"]) == [0, 0.5]
+    assert list(plot.sources["pinned"].data["y"]) == [0, 4]
+    assert list(plot.sources["this run"].data["y"]) == pytest.approx([0, 3e-6])
+    assert plot.figure.yaxis[0].axis_label == "force (N)"
+    plot.show("", {"this run": NOTHING, "pinned": other}, along)
+    assert list(plot.sources["pinned"].data["x"]) == [0, 0.5]
+    assert len(plot.sources["this run"].data["x"]) == 0
+    assert not elements["panel:force"]["hidden"]
+    plot.show("", {"this run": NOTHING}, along)
+    assert elements["panel:force"]["hidden"]
 
 
 def test_the_line_of_the_spring_touches_the_curve():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from bokeh.models.ui import UIElement
 from bokeh.plotting import figure
 
 from mesoslip.explorer.elements import Elements
-from mesoslip.explorer.pictures import NOTHING, Interface, Lattice, Line, Motion, Theory
+from mesoslip.explorer.pictures import NOTHING, Axis, Interface, Lattice, Line, Motion, Theory
 from mesoslip.quantities import with_unit
 
 # Time between two snapshots of an animated lattice [ms].
@@ -89,19 +90,23 @@ class Plot:
             margin=0,
         )
 
-    def show(self, title: str, lines: Mapping[str, Line]) -> None:
-        """Draw lines by their labels in the units of the first one that has points."""
+    def show(self, title: str, lines: Mapping[str, Line], along: Axis | None = None) -> None:
+        """Draw lines by their labels on a horizontal axis, by default that of the first one, in the
+        largest unit that one of them has on the vertical axis."""
         drawn = [label for label, one in lines.items() if not one.is_empty]
         self._elements.show(f"panel:{self._name}", hidden=not drawn)
+        if drawn:
+            first = lines[drawn[0]]
+            unit = max((lines[label].up.unit for label in drawn), key=lambda one: one.size)
+            first = first.on(along or first.along, replace(first.up, unit=unit))
         for label, source in self.sources.items():
             one = lines.get(label, NOTHING)
-            if drawn:
-                one = one.on(lines[drawn[0]])
+            if not one.is_empty:
+                one = one.on(first.along, first.up)
             if len(one.x) or len(source.data["x"]):
                 source.data = {"x": one.x, "y": one.y}
         if not drawn:
             return
-        first = lines[drawn[0]]
         (legend,) = self.figure.legend
         set_changed(legend, visible=len(drawn) > 1)
         for label, item in zip(self.sources, legend.items, strict=True):
@@ -214,7 +219,8 @@ class MotionView:
             title, _ = TITLES[name]
             if name == "force" and not shown.force.is_empty:
                 title = shown.force.up.quantity.capitalize()
-            self._plots[name].show(title, lines)
+            along = None if name == "loop" else shown.force.along
+            self._plots[name].show(title, lines, along)
         slips = {"spring force": shown.slip_force, "contact force": shown.slip_contact_force}
         slips |= {label: other.slip_force for label, other in others.items()}
         self._plots["slip"].show(TITLES["slip"][0], slips)
@@ -261,7 +267,7 @@ class TheoryView:
                 self.plot.figure.x_range, start=0.0, end=end, reset_start=0.0, reset_end=end
             )
         numbers = ", ".join(f"{name} = {value}" for name, value in shown.numbers)
-        text = ". ".join(one for one in (numbers, shown.summary) if one)
+        text = ". ".join(one for one in (numbers, shown.summary) if one).replace("`", "")
         self._elements.show("theory", symbols=text)
 
 

@@ -10,7 +10,7 @@ from mesoslip.explorer.controls import NONE, Control
 from mesoslip.explorer.session import Session
 
 # A symbol with an index, such as τ_d.
-INDEXED = re.compile(r"\b(\w)_(\w+)\b")
+INDEXED = re.compile(r"\b(Δ?\w)_(\w+)\b")
 
 
 def with_indices(text: str) -> str:

@@ -89,18 +89,11 @@ class Line:
         """The label of the vertical axis."""
         return self.up.label
 
-    def on(self, other: Line) -> Line:
-        """The line in the units of another one."""
-        if self.is_empty or other.is_empty:
-            return self
-        x, y = (
-            values * (mine.unit.size / axis.unit.size)
-            for values, mine, axis in (
-                (self.x, self.along, other.along),
-                (self.y, self.up, other.up),
-            )
-        )
-        return Line(x, y, other.along, other.up)
+    def on(self, along: Axis, up: Axis) -> Line:
+        """The line in the units of other axes."""
+        x = self.x * (self.along.unit.size / along.unit.size)
+        y = self.y * (self.up.unit.size / up.unit.size)
+        return Line(x, y, along, up)
 
     @property
     def description(self) -> str:
@@ -278,7 +271,8 @@ def _verdict(results: Results, tree: xr.DataTree) -> tuple[str, bool]:
     that there are none."""
     config, found = results.config, results_of(regimes(tree))[0]
     if math.isinf(config.spring_stiffness):
-        _, _, text = found.summary.partition(": ")
+        # Whatever the number of cycles, a longer run would show no regime.
+        text = found.summary.partition(": ")[2].partition(";")[0]
         complete = results.complete
         return (f"the slider moves with the drive: {text}" if complete else ""), complete
     if results.complete:
@@ -291,7 +285,7 @@ def _extremes(drawn: Line) -> list[tuple[str, str]]:
     if drawn.is_empty:
         return []
     low, high = (number(float(one)) for one in (drawn.y.min(), drawn.y.max()))
-    return [(drawn.up.quantity, f"{low} to {high} {drawn.up.unit.name}".rstrip())]
+    return [("force", f"{low} to {high} {drawn.up.unit.name}".rstrip())]
 
 
 def _forces(

@@ -140,7 +140,15 @@ def test_a_program_that_has_ended_is_reported(browser):
 
 
 # Keys that no choice brings: only a file that has them.
-OF_A_FILE = {"slider.damping", "slider.layer_damping"}
+OF_A_FILE = {
+    "contacts.drag",
+    "slider.damping",
+    "slider.layer_damping",
+    "drive.cycle.frequency",
+    "run.drive_displacement",
+    "slider.loading",
+    "slider.top_stiffness",
+}
 
 
 @pytest.mark.parametrize(
@@ -246,6 +254,10 @@ def test_a_ready_run_begins_anew_and_a_pinned_curve_stays(server, browser):
     assert not browser.value("panel:load", "hidden")
     browser.element("pin").click()
     assert eventually(lambda: browser.data("force:pinned") == [])
+    assert browser.value("panel:interface", "hidden")
+    assert browser.change("preset", "precursors")[1] == "drawn"
+    assert not browser.value("panel:interface", "hidden")
+    assert eventually(lambda: "ruptures of blocks" in browser.text("described:interface"))
     assert browser.errors() == []
 
 
@@ -293,7 +305,7 @@ def test_a_keyboard_reaches_what_a_mouse_does(server, browser):
     # The pictures in words, and the results as a table.
     assert browser.text("described:force").startswith("this run: spring force from -")
     names = [one.text for one in browser.element("results").find_elements(By.TAG_NAME, "th")]
-    assert names[:3] == ["spring force", "breaks", "slips"]
+    assert names[:3] == ["force", "breaks", "slips"]
     assert (
         browser.driver.execute_script(
             "return getComputedStyle(document.activeElement).outlineStyle"

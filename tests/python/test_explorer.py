@@ -41,6 +41,9 @@ from mesoslip.explorer.movies import (
     recorded_for_movie,
 )
 from mesoslip.explorer.pictures import (
+    NOTHING,
+    Axis,
+    Line,
     Measured,
     Theories,
     curve_alone,
@@ -52,7 +55,7 @@ from mesoslip.explorer.stages import read_stages
 from mesoslip.output.tree import build_tree
 from mesoslip.plots.close_up import largest_slip, slip_window
 from mesoslip.plots.movie import chosen_frames
-from mesoslip.quantities import with_unit
+from mesoslip.quantities import scale_for, with_unit
 from mesoslip.simulation.realization import Realization
 from mesoslip.simulation.run_realizations import Results, run_realizations
 
@@ -61,6 +64,12 @@ RANGES = [one for one in CONTROLS if not one.choices and not one.is_text]
 # Starts with keys that no choice brings.
 THERMAL = ("contacts.coupling=equal", "contacts.thermal.rate=1e4 1/s")
 AT_300_K = ("contacts.thermal.temperature=300 K", "contacts.thermal.activation_length=0.3 nm")
+INTERFACE = (
+    "slider.kind=interface",
+    "slider.blocks=8",
+    "slider.length=10 cm",
+    "slider.bar_stiffness=2000 N/m",
+)
 STARTS = {
     "contacts.thermal.rate": (*THERMAL, "contacts.thermal.force_ratio=0.04"),
     "contacts.thermal.force_ratio": (*THERMAL, "contacts.thermal.force_ratio=0.04"),
@@ -68,6 +77,13 @@ STARTS = {
     "contacts.thermal.activation_length": (*THERMAL, *AT_300_K),
     "slider.layer_damping": ("slider.kind=layered", "slider.layers=4"),
     "contacts.drag": ("contacts.drag_rate=0", "contacts.drag=0.01 N s/m"),
+    "slider.loading": INTERFACE,
+    "slider.top_stiffness": (*INTERFACE, "slider.loading=both", "slider.top_stiffness=1 kN/m"),
+    "run.drive_displacement": ("run.duration=none", "run.drive_displacement=0.4 um"),
+    "drive.cycle.frequency": (
+        "drive.velocity=none",
+        "drive.cycle={amplitude = '0.4 um', frequency = '0.1 1/s', cycles = 2}",
+    ),
     "slider.damping": ("slider.damping_ratio=none", "slider.damping=20 1/s"),
 }
 
@@ -310,6 +326,64 @@ def test_a_lattice_counts_its_contacts_and_goes_again(session):
     assert session.config == session.start
 
 
+def test_the_drive_goes_back_and_forth_and_one_way_again(session):
+    """With strokes in which contacts break; so does a start that has them."""
+    assert session.change("drive.stage", STAGES)
+    assert session.change("drive.cycle", "amplitude")
+    cycle = session.config.drive.cycle
+    assert cycle.velocity == 1e-7
+    loading = 18e-6 / 97 + session.config.contacts.break_stretch
+    assert cycle.amplitude == pytest.approx(2 * loading, rel=0.05)
+    assert {"drive.velocity", "drive.stage"}.isdisjoint(session.shown)
+    assert session.change("drive.cycle.cycles", "1")
+    assert session.change("drive.cycle", "none")
+    assert session.changes == {}
+    there = Session(Config.load(KLEIN, STARTS["drive.cycle.frequency"]), KLEIN)
+    assert there.change("drive.cycle", "none")
+    assert there.config.drive.velocity == pytest.approx(4 * 0.4e-6 * 0.1)
+    assert there.change("drive.cycle", "amplitude")
+    assert there.changes == {}
+
+
+def test_an_interface_is_pulled_at_its_edge_and_from_above(session):
+    assert session.change("slider.kind", "interface")
+    before = dict(session.changes)
+    for loading, edge, top in (("both", 97, 97), ("top", None, 97), ("both", 97, 97)):
+        assert session.change("slider.loading", loading), session.problems
+        slider = session.config.slider
+        assert (slider.stiffness, slider.top_stiffness) == (edge, top)
+    assert session.change("slider.loading", "edge")
+    assert session.changes == before | {"slider.loading": "edge"}
+    assert session.change("slider.blocks", "21")
+    assert session.config.contacts.count == 4074
+    assert session.notes["slider.blocks"] == "N is 4074, a multiple of the blocks"
+    assert not session.change("contacts.count", "4080")
+    assert session.change("slider.blocks", "20")
+    assert session.change("contacts.count", "4080")
+    assert session.change("slider.kind", "rigid")
+    assert session.changes == {}
+    both = Session(example_config("fronts"), "fronts.toml")
+    assert both.change("slider.loading", "edge")
+    assert both.config.slider.top_stiffness is None
+    assert both.change("slider.loading", "both")
+    assert both.changes == {}
+
+
+def test_an_interface_is_drawn_in_space_and_time():
+    """Ruptures are where and when blocks break, and the stress falls there."""
+    config = example_config("interface-me").replace({"run.drive_displacement": "0.02 mm"})
+    seen = []
+    run_live(runnable(config), Stop(), lambda results: seen.append(motion(results)))
+    drawn = seen[-1].interface
+    assert drawn.stress.shape[0] == config.slider.blocks
+    # The first block is pulled, and bears more than the last one; none more than its strength.
+    assert drawn.stress[0].max() > 2 * drawn.stress[-1].max()
+    assert drawn.stress.max() < 1.2
+    assert drawn.duration == pytest.approx(seen[-1].end)
+    assert drawn.length == pytest.approx(25)
+    assert drawn.ruptures.y_label == "position (mm)"
+
+
 def test_contacts_begin_to_age_and_cease_to(session):
     """With what a law needs, and without what another one needed."""
     assert session.change("contacts.ageing.law", "log")
@@ -440,6 +514,85 @@ def test_pictures_are_as_long_as_a_picture_is_wide():
     assert "ms" in drawn.slip_force.x_label
     # In the slip all contacts let go, and the force falls to zero.
     assert np.min(np.abs(drawn.slip_contact_force.y)) < 0.1
+
+
+def test_strokes_are_loops_whose_area_is_the_work_of_the_drive():
+    """Whole cycles of a prescribed slider; one direction has no loop."""
+    config = example_config("pre-sliding")
+    seen = []
+    run_live(explored(config), Stop(), lambda results: seen.append((results, motion(results))))
+    results, drawn = seen[-1]
+    assert (drawn.loop.x_label, drawn.loop.y_label) == ("displacement (nm)", "driving force (µN)")
+    assert drawn.loop.x.max() == pytest.approx(2.7, rel=1e-3)
+    area = np.trapezoid(drawn.loop.y, drawn.loop.x) * 1e-15
+    (realization,) = results.realizations
+    tree = build_tree(results)
+    work = float(np.trapezoid(tree["spring_force"].values[0], tree["drive_displacement"].values[0]))
+    assert realization.finished
+    assert area == pytest.approx(work, rel=0.01)
+    assert drawn.loop.description.startswith("driving force from -")
+
+
+def test_stages_that_end_before_the_run_are_reported():
+    page, _ = page_of()
+    try:
+        ask(page, "set", "drive.stage", "2 s at 0.1 um/s; hold 1 s")
+        assert page.elements["notes"]["text"].startswith("the stages end after 3 s")
+        ask(page, "undo")
+        assert page.elements["notes"]["text"] == ""
+    finally:
+        page.close()
+
+
+def test_a_slider_that_moves_with_the_drive_is_not_said_to_slip_or_to_slide_smoothly():
+    """The beginning of a run is not judged but by its slips."""
+    parts = []
+
+    def verdict(*changes):
+        parts.clear()
+        config = explored(Config.load(KLEIN, changes))
+        run_live(config, Stop(), lambda results: parts.append(motion(results)))
+        return parts[-1].regime
+
+    text = verdict("slider.kind=prescribed", "run.duration=2 s")
+    assert text.startswith("the slider moves with the drive: force amplitude 3")
+    assert parts[-1].is_judged
+    assert parts[-1].velocity.is_empty
+    assert parts[-1].slip_force.is_empty
+    assert parts[-1].force.up.quantity == "driving force"
+    few = verdict("slider.kind=prescribed", "run.duration=0.1 s")
+    assert "longer" not in few
+    assert "longer duration" in verdict("run.duration=1 s")
+    assert not parts[-1].is_judged
+    realization = Realization(explored(Config.load(KLEIN)), 0)
+    realization.advance(work=5_000)
+    drawn = motion(Results(realization.config, [realization], False, 1.0))
+    realization.close()
+    assert (drawn.regime, drawn.is_judged) == ("", False)
+
+
+def test_curves_of_other_units_lie_on_the_axes_of_the_run():
+    """Forces in the largest unit, times in that of the run; also where the run has no curve."""
+    Plot = pytest.importorskip("mesoslip.explorer.figures").Plot  # noqa: N806
+    from mesoslip.explorer.elements import Elements
+
+    elements = Elements(lambda *_: None)
+    plot = Plot(elements, "force", "", {"this run": "black", "pinned": "red"})
+    along, slow = Axis("time", scale_for(1.0, "s")), Axis("time", scale_for(1e-3, "s"))
+    weak, strong = (Axis("force", scale_for(size, "N")) for size in (1e-6, 1.0))
+    mine = Line(np.array([0.0, 2.0]), np.array([0.0, 3.0]), along, weak)
+    other = Line(np.array([0.0, 500.0]), np.array([0.0, 4.0]), slow, strong)
+    plot.show("", {"this run": mine, "pinned": other}, along)
+    assert list(plot.sources["pinned"].data["x"]) == [0, 0.5]
+    assert list(plot.sources["pinned"].data["y"]) == [0, 4]
+    assert list(plot.sources["this run"].data["y"]) == pytest.approx([0, 3e-6])
+    assert plot.figure.yaxis[0].axis_label == "force (N)"
+    plot.show("", {"this run": NOTHING, "pinned": other}, along)
+    assert list(plot.sources["pinned"].data["x"]) == [0, 0.5]
+    assert len(plot.sources["this run"].data["x"]) == 0
+    assert not elements["panel:force"]["hidden"]
+    plot.show("", {"this run": NOTHING}, along)
+    assert elements["panel:force"]["hidden"]
 
 
 def test_the_line_of_the_spring_touches_the_curve():
@@ -1069,6 +1222,7 @@ FAST_MOVIE = ("run.duration=2.2 s", "contacts.count=400")
             ),
             "lattice",
         ),
+        (INTERFACE, "fronts"),
     ],
 )
 def test_a_run_is_recorded_for_its_movie(changes, view):
@@ -1085,6 +1239,10 @@ def test_a_run_is_recorded_for_its_movie(changes, view):
         times = np.array(around.output.snapshots)
         assert np.sum((times >= low) & (times <= high)) >= 70
         assert len(times) <= 100
+    if view == "layers":
+        (slip,) = [largest_slip(build_tree(results))]
+        low, high = slip_window(slip)
+        assert around_slip(wanted, results).output.interval <= 1.01 * (high - low) / 100
 
 
 def test_a_movie_is_made_or_the_key_is_named(monkeypatch):
@@ -1096,7 +1254,9 @@ def test_a_movie_is_made_or_the_key_is_named(monkeypatch):
         said.append,
     )
     assert movie.startswith(b"GIF8")
-    assert said == ["the movie: running …", "the movie: drawing …"]
+    assert said[0] == "the movie: running …"
+    assert [one for one in said[1:] if one.endswith(" % drawn")] == said[1:]
+    assert said[-1] == "the movie: 100 % drawn"
     with pytest.raises(ConfigError, match=r"run.engine.*movie"):
         movie_of(Config.load(KLEIN, (*FAST_MOVIE, "run.engine=me")), Stop(), said.append)
     stop = Stop()

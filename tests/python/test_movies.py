@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import sys
 
 import mesoslip
@@ -140,6 +141,25 @@ def test_the_load_of_ageing_contacts_is_that_of_the_moment():
     limits = (data["stretch"] / data["load"]).values
     grown = 1 + 0.2 * np.log1p(np.array(times) / 0.1)
     np.testing.assert_allclose(limits / limits[0], np.outer(grown / grown[0], np.ones(120)))
+
+
+@pytest.mark.parametrize("view", ["lattice", "contacts", "layers"])
+def test_what_changes_in_a_frame_is_drawn_as_in_the_whole_figure(
+    few_snapshots, layered, view, monkeypatch
+):
+    """To the pixel, with the frames of axes over it."""
+    tree = layered if view == "layers" else few_snapshots
+
+    def frames():
+        with styled():
+            return list(dataclasses.replace(movie_of(tree, view), count=6).frames())
+
+    parts = frames()
+    monkeypatch.setattr(movies._FrameCanvas, "draw_frame", lambda canvas: canvas.draw())
+    whole = frames()
+    assert len(parts) == len(whole) > 2
+    assert any((one != parts[0]).any() for one in parts)
+    np.testing.assert_array_equal(parts, whole)
 
 
 def test_axes_of_a_movie_stay(layered):

@@ -19,6 +19,7 @@ from mesoslip.configuration.differences import flat
 from mesoslip.configuration.keys import key_kind
 from mesoslip.configuration.meanings import meaning
 from mesoslip.configuration.sliders import SLIDERS
+from mesoslip.configuration.sliders.interface import LOADINGS
 from mesoslip.configuration.threshold_laws import LAWS
 from mesoslip.quantities import with_unit
 
@@ -173,6 +174,10 @@ def lattice_size(count: int, lattice: str) -> tuple[int, int]:
     return min(nearly, key=lambda pair: (abs(pair[0] * pair[1] - count), ratio(*pair)))
 
 
+# Amplitude of strokes over the distance that loads contacts and spring, and their speed where the
+# drive has none [m/s].
+STROKES_OVER_LOADING = 2.0
+USUAL_SPEED = 1e-7
 # Activation of contacts that are switched to it: f_T/f_s at a temperature [K].
 ACTIVATION_RATIO = 0.04
 ROOM_TEMPERATURE = 300.0
@@ -182,7 +187,19 @@ def derived_value(key: str, config: Config) -> str:
     """Value of a key that a switch needs and that follows from the others."""
     if key == "contacts.track.length":
         return f"{config.contacts.break_stretch}"
+    if key.startswith("drive."):
+        return _of_strokes(key, config)
+    if key.startswith("slider."):
+        return with_unit(config.spring_stiffness, "N/m", 4)
     return activation_length(config)
+
+
+def _of_strokes(key: str, config: Config) -> str:
+    """Speed of the drive, and an amplitude with which contacts break in each stroke."""
+    if key != "drive.cycle.amplitude":
+        return with_unit(config.drive_speed or USUAL_SPEED, "m/s", 4)
+    loading = config.contacts.break_stretch + config.contacts.static_force / config.spring_stiffness
+    return with_unit(STROKES_OVER_LOADING * loading, "m", 2)
 
 
 def activation_length(config: Config) -> str:
@@ -194,7 +211,31 @@ def activation_length(config: Config) -> str:
 CONTROLS = (
     Control("drive.velocity", "drive velocity", 3),
     Control("drive.stage", "stages of the drive", is_text=True),
+    Control(
+        "drive.cycle",
+        "direction",
+        choices=(NONE, "amplitude"),
+        choice_labels={NONE: "one, or that of stages", "amplitude": "strokes, back and forth"},
+        # Amplitude and speed follow from the other keys, see `derived_value`.
+        required={
+            NONE: {"drive.velocity": ""},
+            "amplitude": {
+                "drive.velocity": NONE,
+                "drive.stage": NONE,
+                "drive.cycle.amplitude": "",
+                "drive.cycle.velocity": "",
+                "drive.cycle.cycles": "3",
+            },
+        },
+        is_switch=True,
+        own_meaning="Strokes between plus and minus an amplitude, instead of one velocity.",
+    ),
+    Control("drive.cycle.amplitude", "amplitude of the strokes", 1.5, usual=4e-7),
+    Control("drive.cycle.velocity", "speed of the strokes", 3, usual=USUAL_SPEED),
+    Control("drive.cycle.frequency", "frequency of the strokes", 2, usual=0.1),
+    Control("drive.cycle.cycles", "cycles", range=(1, 50)),
     Control("run.duration", "duration", 1),
+    Control("run.drive_displacement", "displacement of the drive", 1, usual=1e-6),
     Control("run.seed", "seed", range=(1, 100)),
     Control(
         "run.engine",
@@ -218,12 +259,29 @@ CONTROLS = (
             },
         },
     ),
+    Control(
+        "slider.loading",
+        "springs of the drive",
+        choices=LOADINGS,
+        choice_labels={"edge": "at the first block", "top": "from above", "both": "both"},
+        # Each stiffness is that of the other spring, see `derived_value`.
+        required={
+            "edge": {"slider.stiffness": "", "slider.top_stiffness": NONE},
+            "top": {"slider.stiffness": NONE, "slider.top_stiffness": ""},
+            "both": {"slider.stiffness": "", "slider.top_stiffness": ""},
+        },
+    ),
     Control("slider.stiffness", "spring K", 2),
+    Control("slider.top_stiffness", "springs from above K_t", 2, usual=100.0),
     Control("slider.mass", "mass M", 2),
     Control("slider.damping_ratio", "damping η_S/Ω_S", range=(0, 2)),
     Control("slider.damping", "damping rate η_S", 2, usual=10.0),
     Control("slider.layer_damping", "damping of layers", 2, usual=10.0),
     Control("slider.layers", "layers", range=(1, 64)),
+    Control("slider.blocks", "blocks N_b", 1, (1, 1000), 8),
+    Control("slider.length", "length", 1, usual=0.1),
+    Control("slider.bar_stiffness", "stiffness of the row K_b", 2, usual=1000.0),
+    Control("slider.neighbour_damping", "damping of neighbours γ", 2, usual=1000.0),
     Control("contacts.count", "number N", 2, (10, 1e6)),
     Control("contacts.static_force", "static force F_s", 1),
     Control("contacts.stiffness", "stiffness Nk", 1.5),

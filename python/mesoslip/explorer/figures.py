@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from bokeh.models.ui import UIElement
 from bokeh.plotting import figure
 
 from mesoslip.explorer.elements import Elements
-from mesoslip.explorer.pictures import NOTHING, Lattice, Line, Motion, Theory
+from mesoslip.explorer.pictures import NOTHING, Axis, Interface, Lattice, Line, Motion, Theory
 from mesoslip.quantities import with_unit
 
 # Time between two snapshots of an animated lattice [ms].
@@ -89,19 +90,23 @@ class Plot:
             margin=0,
         )
 
-    def show(self, title: str, lines: Mapping[str, Line]) -> None:
-        """Draw lines by their labels in the units of the first one that has points."""
+    def show(self, title: str, lines: Mapping[str, Line], along: Axis | None = None) -> None:
+        """Draw lines by their labels on a horizontal axis, by default that of the first one, in the
+        largest unit that one of them has on the vertical axis."""
         drawn = [label for label, one in lines.items() if not one.is_empty]
         self._elements.show(f"panel:{self._name}", hidden=not drawn)
+        if drawn:
+            first = lines[drawn[0]]
+            unit = max((lines[label].up.unit for label in drawn), key=lambda one: one.size)
+            first = first.on(along or first.along, replace(first.up, unit=unit))
         for label, source in self.sources.items():
             one = lines.get(label, NOTHING)
-            if drawn:
-                one = one.on(lines[drawn[0]])
+            if not one.is_empty:
+                one = one.on(first.along, first.up)
             if len(one.x) or len(source.data["x"]):
                 source.data = {"x": one.x, "y": one.y}
         if not drawn:
             return
-        first = lines[drawn[0]]
         (legend,) = self.figure.legend
         set_changed(legend, visible=len(drawn) > 1)
         for label, item in zip(self.sources, legend.items, strict=True):
@@ -113,12 +118,65 @@ class Plot:
         self._elements.show(f"described:{self._name}", text=words)
 
 
+class InterfaceView:
+    """An interface in space and time: stress over strength, and the ruptures of blocks."""
+
+    def __init__(self, elements: Elements, x_range: Range1d) -> None:
+        self._elements = elements
+        self._stress = ColumnDataSource(
+            {"image": [], "x": [], "y": [], "dw": [], "dh": []}, name="interface:image"
+        )
+        self._ruptures = ColumnDataSource({"x": [], "y": []}, name="interface:ruptures")
+        self._range = Range1d(start=0, end=1)
+        picture = figure(
+            name="interface",
+            title="Stress over strength along the interface; dots: blocks break",
+            height=240,
+            min_border_left=LEFT,
+            min_border_right=RIGHT,
+            sizing_mode="stretch_width",
+            tools="pan,wheel_zoom,box_zoom,reset,save",
+            x_range=x_range,
+            y_range=self._range,
+        )
+        picture.toolbar.logo = None
+        picture.toolbar.autohide = True
+        picture.axis.axis_label_text_font_style = "normal"
+        mapper = LinearColorMapper(palette="Cividis256", low=0, high=1)
+        look: dict[str, Any] = {"color_mapper": mapper}
+        picture.image(source=self._stress, **look)
+        picture.scatter("x", "y", source=self._ruptures, size=4, color="#e4572e")
+        bar: dict[str, Any] = {"orientation": "horizontal", "height": 6, "width": 240, "padding": 2}
+        picture.add_layout(ColorBar(color_mapper=mapper, **bar), "above")
+        self._figure = picture
+        self.roots: list[UIElement] = [picture]
+
+    def show(self, shown: Interface | None) -> None:
+        """Draw an interface; nothing without one."""
+        self._elements.show("panel:interface", hidden=shown is None)
+        if shown is None:
+            return
+        image = {"image": [shown.stress], "x": [0], "y": [0]}
+        self._stress.data = image | {"dw": [shown.duration], "dh": [shown.length]}
+        drawn = shown.ruptures
+        self._ruptures.data = {"x": drawn.x, "y": drawn.y}
+        set_changed(self._range, start=0.0, end=shown.length, reset_start=0.0)
+        set_changed(self._range, reset_end=shown.length)
+        set_changed(self._figure.xaxis[0], axis_label=drawn.x_label)
+        set_changed(self._figure.yaxis[0], axis_label=drawn.y_label)
+        words = f"{shown.stress.shape[0]} blocks, {len(drawn.x)} ruptures of blocks"
+        if not drawn.is_empty:
+            words += f"; {drawn.description}"
+        self._elements.show("described:interface", text=words)
+
+
 # Titles of the pictures of a run, and their heights.
 TITLES = {
     "force": ("Force", 210),
     "velocity": ("Velocity", 175),
     "load": ("Normal force", 175),
     "detached": ("Detached contacts", 175),
+    "loop": ("Force against the displacement of the slider", 175),
     "slip": ("The largest slip", 190),
 }
 
@@ -140,17 +198,20 @@ class MotionView:
                 colors = {MEASURED: OVER[MEASURED]} | colors
             if is_slip:
                 colors = {"contact force": CONTACT} | colors
-            style: dict[str, Any] = {} if is_slip else {"x_range": self._range}
+            is_over_time = name not in {"loop", "slip"}
+            style: dict[str, Any] = {"x_range": self._range} if is_over_time else {}
             self._plots[name] = Plot(elements, name, title, colors, height, **style)
         force = self._plots["force"].figure
         force.add_layout(self.now)
         self._done = BoxAnnotation(left=0, fill_color="#888888", fill_alpha=0.12, visible=False)
         force.add_layout(self._done)
-        self.roots: list[UIElement] = [plot.figure for plot in self._plots.values()]
+        self._interface = InterfaceView(elements, self._range)
+        plots = [plot.figure for plot in self._plots.values()]
+        self.roots: list[UIElement] = [*plots, *self._interface.roots]
 
     def show(self, shown: Motion, others: Mapping[str, Motion]) -> None:
         """Draw a run as far as it is done, and others over it; the rest of the time is grey."""
-        for name in ("force", "velocity", "load", "detached"):
+        for name in ("force", "velocity", "load", "detached", "loop"):
             lines = {THIS: getattr(shown, name)}
             lines |= {label: getattr(other, name) for label, other in others.items()}
             if name == "force":
@@ -158,10 +219,12 @@ class MotionView:
             title, _ = TITLES[name]
             if name == "force" and not shown.force.is_empty:
                 title = shown.force.up.quantity.capitalize()
-            self._plots[name].show(title, lines)
+            along = None if name == "loop" else shown.force.along
+            self._plots[name].show(title, lines, along)
         slips = {"spring force": shown.slip_force, "contact force": shown.slip_contact_force}
         slips |= {label: other.slip_force for label, other in others.items()}
         self._plots["slip"].show(TITLES["slip"][0], slips)
+        self._interface.show(shown.interface)
         set_changed(self._range, start=0.0, end=shown.end, reset_start=0.0, reset_end=shown.end)
         reached = shown.force.x[-1] if len(shown.force.x) else 0.0
         set_changed(self._done, left=float(reached), visible=shown.part_done < 1)
@@ -204,7 +267,7 @@ class TheoryView:
                 self.plot.figure.x_range, start=0.0, end=end, reset_start=0.0, reset_end=end
             )
         numbers = ", ".join(f"{name} = {value}" for name, value in shown.numbers)
-        text = ". ".join(one for one in (numbers, shown.summary) if one)
+        text = ". ".join(one for one in (numbers, shown.summary) if one).replace("`", "")
         self._elements.show("theory", symbols=text)
 
 

@@ -10,7 +10,7 @@ from mesoslip.explorer.controls import NONE, Control
 from mesoslip.explorer.session import Session
 
 # A symbol with an index, such as τ_d.
-INDEXED = re.compile(r"\b(\w)_(\w+)\b")
+INDEXED = re.compile(r"\b(Δ?\w)_(\w+)\b")
 
 
 def with_indices(text: str) -> str:
@@ -28,8 +28,10 @@ class Knob:
     def begin(self) -> None:
         """Center the range of the slider on the value at the start of the session."""
         control = self.control
+        value = self._session.values.get(control.key)
         has_range = not control.choices and not control.is_text
-        self._scale = control.scale(self._session.values.get(control.key)) if has_range else None
+        self._scale = control.scale(value) if has_range else None
+        self._is_centered = value is not None
         # The position where the user left the slider; the text of its value is rounded.
         self._position = 0
 
@@ -60,6 +62,9 @@ class Knob:
         value = session.values.get(key)
         if self._scale is not None:
             if isinstance(value, int | float):
+                if not self._is_centered:
+                    # A key that came with a choice.
+                    self._scale, self._is_centered = control.scale(value), True
                 is_there = self.control.text(self._scale.value(self._position)) == shown["value"]
                 if not is_there:
                     self._position = self._scale.position(float(value))

@@ -20,27 +20,41 @@ from mesoslip.simulation.run_realizations import Results
 # Number of snapshots of a movie, and the fraction of them in the largest slip.
 SNAPSHOTS = 100
 IN_SLIP = 0.7
+# Maximum number of recorded displacements of layers.
+MAX_LAYER_SAMPLES = 2_000_000
+# Step of the reports of progress [%].
+REPORTED = 10
 
 
 def movie_of(config: Config, stop: StopRequest, report: Callable[[str], None]) -> bytes | None:
     """A movie of a run as a GIF; None if it was stopped.
 
-    On a lattice it shows the load of each contact, of an elastic slider its layers, and otherwise
-    the stretches of the contacts. Messages on its progress are reported.
+    On a lattice it shows the load of each contact, of an elastic slider its layers, of an interface
+    its largest event, and otherwise the stretches of the contacts. Messages on its progress are
+    reported.
     """
     view, wanted = recorded_for_movie(config)
     report("the movie: running …")
+
+    last = 0
+
+    def drawn(part: float) -> None:
+        nonlocal last
+        tens = REPORTED * int(100 * part / REPORTED)
+        if tens > last:
+            last = tens
+            report(f"the movie: {tens} % drawn")
+
     results = finished_run(wanted, stop)
     if results is None:
         return None
-    if view == "contacts":
+    if view in {"contacts", "layers"}:
         results = finished_run(around_slip(wanted, results), stop)
         if results is None:
             return None
-    report("the movie: drawing …")
     with TemporaryDirectory() as folder:
         path = Path(folder) / "movie.gif"
-        plot(build_tree(results), path, view=view)
+        plot(build_tree(results), path, view=view, progress=drawn)
         return path.read_bytes()
 
 
@@ -49,6 +63,8 @@ def recorded_for_movie(config: Config) -> tuple[str, Config]:
     wanted = explored(config)
     if wanted.contact_kind.on_lattice:
         return "lattice", wanted
+    if wanted.slider.block_count > 1:
+        return "fronts", wanted
     if wanted.slider.layer_count > 1:
         return "layers", wanted.replace({"output.layers": True})
     if not wanted.contact_kind.is_discrete:
@@ -58,9 +74,18 @@ def recorded_for_movie(config: Config) -> tuple[str, Config]:
 
 
 def around_slip(config: Config, results: Results) -> Config:
-    """A configuration with snapshots, most of them in the largest slip of its run."""
+    """A configuration with snapshots, most of them in the largest slip of its run; of layers with
+    samples that are fine enough for the slip."""
     slip = largest_slip(build_tree(results))
     end = config.expected_duration
+    if config.output.layers:
+        if slip is None:
+            return config
+        low, high = slip_window(slip)
+        min_interval = end * config.slider.layer_count / MAX_LAYER_SAMPLES
+        interval = min(max((high - low) / SNAPSHOTS, min_interval), config.output_interval)
+        fine = min(interval, config.slip_interval or interval)
+        return config.replace({"output.interval": interval, "output.slip_interval": fine})
     if slip is None:
         return config.replace({"output.snapshots": np.linspace(0.0, end, SNAPSHOTS).tolist()})
     low, high = slip_window(slip)

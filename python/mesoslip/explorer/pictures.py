@@ -89,18 +89,11 @@ class Line:
         """The label of the vertical axis."""
         return self.up.label
 
-    def on(self, other: Line) -> Line:
-        """The line in the units of another one."""
-        if self.is_empty or other.is_empty:
-            return self
-        x, y = (
-            values * (mine.unit.size / axis.unit.size)
-            for values, mine, axis in (
-                (self.x, self.along, other.along),
-                (self.y, self.up, other.up),
-            )
-        )
-        return Line(x, y, other.along, other.up)
+    def on(self, along: Axis, up: Axis) -> Line:
+        """The line in the units of other axes."""
+        x = self.x * (self.along.unit.size / along.unit.size)
+        y = self.y * (self.up.unit.size / up.unit.size)
+        return Line(x, y, along, up)
 
     @property
     def description(self) -> str:
@@ -155,6 +148,18 @@ class Lattice:
 
 
 @dataclass(frozen=True)
+class Interface:
+    """An interface in space and time, in the units of its axes: the force on the contacts of each
+    block over their strength, shape (blocks, times), at equal intervals of time up to the last, and
+    time and position at which half the contacts of a block have broken."""
+
+    stress: NDArray[np.float32]
+    duration: float
+    length: float
+    ruptures: Line
+
+
+@dataclass(frozen=True)
 class Motion:
     """A run, as far as it is done: lines over time, those of its largest slip, and results."""
 
@@ -162,6 +167,8 @@ class Motion:
     velocity: Line
     detached: Line
     load: Line
+    loop: Line
+    """The force against the displacement of the slider, if the drive goes back and forth."""
     slip_force: Line
     slip_contact_force: Line
     measured: Line
@@ -175,6 +182,7 @@ class Motion:
     numbers: tuple[tuple[str, str], ...]
     """Names and values of further results."""
     lattice: Lattice | None
+    interface: Interface | None
     part_done: float
     progress: str
     """The part that is done in words, with the time that the rest takes."""
@@ -235,6 +243,7 @@ def motion(results: Results, measured: Measured | None = None) -> Motion:
         velocity,
         detached,
         load,
+        _loop(tree, extent, force),
         close,
         close_contact,
         beside,
@@ -242,9 +251,19 @@ def motion(results: Results, measured: Measured | None = None) -> Motion:
         *_verdict(results, tree),
         tuple(numbers),
         _lattice(tree, along),
+        _interface(tree, along, reached),
         1.0 if results.complete else realization.part_done,
         _progress(results),
     )
+
+
+def _loop(tree: xr.DataTree, extent: Extent, force: Line) -> Line:
+    directions = {one for part in config_of(tree).drive_parts for one in part.directions}
+    if len(directions) < 2 or force.is_empty:
+        return NOTHING
+    x, y = line(tree, ("displacement", force_of(tree)), extent, extent.window(tree))
+    across = scale_for(_largest(x), "m")
+    return Line(x / across.size, y / force.up.unit.size, Axis("displacement", across), force.up)
 
 
 def _verdict(results: Results, tree: xr.DataTree) -> tuple[str, bool]:
@@ -252,7 +271,8 @@ def _verdict(results: Results, tree: xr.DataTree) -> tuple[str, bool]:
     that there are none."""
     config, found = results.config, results_of(regimes(tree))[0]
     if math.isinf(config.spring_stiffness):
-        _, _, text = found.summary.partition(": ")
+        # Whatever the number of cycles, a longer run would show no regime.
+        text = found.summary.partition(": ")[2].partition(";")[0]
         complete = results.complete
         return (f"the slider moves with the drive: {text}" if complete else ""), complete
     if results.complete:
@@ -265,7 +285,7 @@ def _extremes(drawn: Line) -> list[tuple[str, str]]:
     if drawn.is_empty:
         return []
     low, high = (number(float(one)) for one in (drawn.y.min(), drawn.y.max()))
-    return [(drawn.up.quantity, f"{low} to {high} {drawn.up.unit.name}".rstrip())]
+    return [("force", f"{low} to {high} {drawn.up.unit.name}".rstrip())]
 
 
 def _forces(
@@ -380,6 +400,27 @@ def _lattice(tree: xr.DataTree, along: Scale) -> Lattice | None:
     largest = np.zeros(len(times) + 1, dtype=np.int64)
     np.maximum.at(largest, position, catalogue["size"].values.astype(np.int64))
     return Lattice(times, times / along.size, loads, largest[:-1])
+
+
+def _interface(tree: xr.DataTree, along: Scale, reached: float) -> Interface | None:
+    if "blocks" not in tree.children or not reached:
+        return None
+    config = config_of(tree)
+    blocks, spacing = config.slider.block_count, config.slider.block_spacing
+    across = scale_for(blocks * spacing, "m")
+    wanted = np.linspace(0.0, reached, min(PARTS, tree.sizes["time"]))
+    chosen = np.unique(np.searchsorted(times_of(tree), wanted).clip(max=tree.sizes["time"] - 1))
+    forces = group_of(tree, "blocks")["block_contact_force"].isel(realization=0, time=chosen).values
+    data = group_of(tree, "ruptures")
+    places = (data["block_number"].values - 0.5) * spacing
+    ruptures = Line(
+        data["rupture_time"].values / along.size,
+        places / across.size,
+        Axis("time", along),
+        Axis("position", across),
+    )
+    stress = (forces.T * (blocks / config.contacts.static_force)).astype(np.float32)
+    return Interface(stress, reached / along.size, blocks * spacing / across.size, ruptures)
 
 
 class Theories:

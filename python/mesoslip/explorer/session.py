@@ -192,6 +192,8 @@ class Session:
             self._fit_lattice(text)
         if key in LATTICE_SIZE:
             self._count_lattice()
+        if key in {"slider.kind", "slider.blocks"}:
+            self._divide_among_blocks(key)
 
     def _set_stages(self, text: str) -> None:
         """Change the drive to stages, or back to one velocity."""
@@ -218,6 +220,8 @@ class Session:
             return
         if text == NONE:
             self.changes[table] = NONE
+            for one, value in needed.get(NONE, {}).items():
+                self.changes[one] = value or derived_value(one, self.config)
             return
         for one in sorted(every):
             is_there = one in self._at_start
@@ -287,14 +291,20 @@ class Session:
                 table, _, name = one.partition(".")
                 if table == "slider" and kept and name not in kept:
                     del self.changes[one]
+            for one in mine:
+                is_omitted = needed.get(text, {}).get(one, NONE) == NONE
+                if self.changes.get(one) == NONE or (is_omitted and one not in known):
+                    self.changes.pop(one, None)
         if key in self.changes:
             for one, value in needed.get(text, {}).items():
                 if one in LATTICE_SIZE:
                     continue
                 # Keys of a table are given only if the table is.
                 is_given = one in known and (key not in TABLE_CONTROLS or known[key] != NONE)
-                if not is_given:
-                    self.changes.setdefault(one, value)
+                if value == NONE and is_given:
+                    self.changes[one] = NONE
+                elif value != NONE and not is_given:
+                    self.changes.setdefault(one, value or derived_value(one, self.config))
 
     def _fit_lattice(self, lattice: str) -> None:
         """Set columns and rows to those of N contacts, unless the present ones fit."""
@@ -310,6 +320,19 @@ class Session:
         sites = columns * rows
         kept = "N is kept" if sites == count else f"N is {sites}, as {count} contacts have none"
         self.notes["interaction.lattice"] = f"{columns} columns × {rows} rows: {kept}"
+
+    def _divide_among_blocks(self, key: str) -> None:
+        """Set the number of contacts to the nearest multiple of the number of blocks."""
+        count = self.config.contacts.count
+        try:
+            blocks = int(self.text("slider.blocks") or 1)
+        except ValueError:
+            return
+        if self.text("slider.kind") != "interface" or blocks < 1 or count % blocks == 0:
+            return
+        near = blocks * max(1, round(count / blocks))
+        self.changes["contacts.count"] = str(near)
+        self.notes[key] = f"N is {near}, a multiple of the blocks"
 
     def _count_lattice(self) -> None:
         """Set the number of contacts to that of the sites of the lattice."""

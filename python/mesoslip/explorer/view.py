@@ -54,6 +54,7 @@ MAX_KEYS = 3
 # Titles of the figures, for those who do not see them.
 FIGURES = {
     "force": "Force",
+    "interface": "Stress over strength along the interface",
     "lattice": "Load of the contacts: force over threshold",
     **{name: title for name, (title, _) in TITLES.items()},
     "curve": "F(X) of slow sliding",

@@ -10,9 +10,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.cm import ScalarMappable
+from matplotlib.collections import Collection
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.text import Text
 from numpy.typing import NDArray
 from PIL import Image
 
@@ -49,16 +55,76 @@ class Movie:
     ) -> Iterator[NDArray[np.uint8]]:
         """The frames, shape (height, width, 3)."""
         self.figure.set_dpi(DPI)
-        canvas = FigureCanvasAgg(self.figure)
+        canvas = _FrameCanvas(self.figure)
         for number in range(self.count):
             self.show(number)
-            canvas.draw()  # type: ignore[no-untyped-call]
+            canvas.draw_frame()
             # All frames have the layout of the first.
             self.figure.set_layout_engine("none")
             frame = np.asarray(canvas.buffer_rgba())  # type: ignore[no-untyped-call]
             yield frame[..., :3].copy()
             if progress is not None:
                 progress((number + 1) / self.count)
+
+
+# Artists that are drawn alone; a change of any other one needs the whole figure.
+SIMPLE = (Line2D, Patch, Text, Collection)
+
+
+class _FrameCanvas(FigureCanvasAgg):
+    """Draws what changes from frame to frame, such as lines, texts and colours, over a background.
+
+    If anything else changes, such as the limits of an axis, it draws the whole figure.
+    """
+
+    def __init__(self, figure: Figure) -> None:
+        super().__init__(figure)
+        self._moving: list[Artist] = []
+        self._background: Any = None
+        self._is_first = True
+
+    def draw_frame(self) -> None:
+        """Draw the figure, as far as it has changed."""
+        changed = [] if self._is_first else self._changed()
+        if self._is_first or not all(isinstance(one, SIMPLE) for one in changed):
+            self._is_first, self._moving, self._background = False, [], None
+            self.draw()  # type: ignore[no-untyped-call]
+            return
+        new = [one for one in changed if one not in self._moving]
+        if new or self._background is None:
+            # The frames of axes lie over what moves in them.
+            own = {one.axes for one in new}
+            spines = [one for axes in self.figure.axes for one in axes.spines.values()]
+            new += [one for one in spines if one.axes in own and one.get_visible()]
+            self._moving = sorted(
+                dict.fromkeys(self._moving + new), key=lambda one: one.get_zorder()
+            )
+            self._draw_background()
+        self.restore_region(self._background)  # type: ignore[no-untyped-call]
+        for one in self._moving:
+            one.draw(self.get_renderer())  # type: ignore[no-untyped-call]
+
+    def _changed(self) -> list[Artist]:
+        """Visible artists that have changed since they were drawn."""
+        parts = [one for axes in self.figure.axes for one in axes.get_children()]
+        parts += [*self.figure.texts, *self.figure.legends]
+        # New values for colours do not mark an artist as changed.
+        return [
+            one
+            for one in parts
+            if one.get_visible()
+            and (one.stale or (isinstance(one, ScalarMappable) and one.get_array() is not None))
+            and not (isinstance(one, Text) and not one.get_text())
+        ]
+
+    def _draw_background(self) -> None:
+        """Draw what does not change."""
+        for one in self._moving:
+            one.set_animated(True)
+        self.draw()  # type: ignore[no-untyped-call]
+        self._background = self.copy_from_bbox(self.figure.bbox)  # type: ignore[no-untyped-call]
+        for one in self._moving:
+            one.set_animated(False)
 
 
 def chosen_frames(times: Array, activity: Array, count: int = MAX_FRAMES) -> NDArray[np.intp]:

@@ -16,7 +16,14 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from mesoslip.analysis.rate_and_state import Fit, NoiseModel, Record, fit_laws, preferred_law
+from mesoslip.analysis.rate_and_state import (
+    Fit,
+    NoiseModel,
+    Record,
+    estimated_noise,
+    fit_laws,
+    preferred_law,
+)
 from mesoslip.errors import FileError, RunError
 from mesoslip.execution.stop import StoppedError, StopRequest
 from mesoslip.inference.prior import FreeParameter, Prior
@@ -175,7 +182,8 @@ class Density:
         parameters)."""
         fit, size = self.fit, len(self.law.names)
         low, high = fit.law.bounds()
-        noise = fit.noise
+        # That about this law, which may not be the best one.
+        noise = estimated_noise(fit.law.points, fit.law.residuals(fit.at), fit.law.jacobian(fit.at))
         time = noise.time if noise.time > 0 else math.sqrt(math.prod(self.noise.times))
         for spread in SPREADS:
             away = rng.multivariate_normal(np.zeros(size), fit.covariance, STARTS, method="svd")
@@ -200,9 +208,10 @@ def prior_of(fit: Fit) -> Prior:
     were fitted."""
     law = fit.law
     points, scale = law.points, law.scale
+    low, high = (dict(zip(law.names, np.exp(one), strict=True)) for one in law.bounds())
     steep = MAX_TREND * scale / law.length
     friction = float(np.max(np.abs(points.force)))
-    length = (*law.distances, True, "m")
+    length = (low["slip_distance"], high["slip_distance"], True, "m")
     change = (-friction, friction, False, "N")
     ranges: dict[str, tuple[float, float, bool, str]] = {
         "reference_force": (
@@ -217,7 +226,7 @@ def prior_of(fit: Fit) -> Prior:
         "slip_distance": length,
         "b2": change,
         "slip_distance2": length,
-        "stiffness": (*law.stiffnesses, True, "N/m"),
+        "stiffness": (low.get("stiffness", 0.0), high.get("stiffness", 0.0), True, "N/m"),
         "noise": (MIN_NOISE * scale, scale, True, "N"),
         "noise_share": (0.0, 1.0, False, "1"),
         "noise_time": (*NoiseModel.of(points).times, True, "s"),

@@ -9,7 +9,7 @@ not known.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -95,7 +95,8 @@ def sample_laws(
     """Posteriors of laws of a record, the preferred or likeliest law first.
 
     Without names of laws these are the laws of one state variable, and those of two whose
-    parameters least squares determine.
+    parameters least squares determine, but for those that do not describe a record that others
+    describe.
 
     Raises
     ------
@@ -115,10 +116,8 @@ def sample_laws(
         raise RunError(
             f"the motion of the law {missing[0]!r} along this record cannot be integrated"
         )
-    chosen = list(laws) or [
-        name for name, one in fits.items() if one.law.states == 1 or one.is_determined
-    ]
-    preferred = preferred_law(fits)
+    chosen = list(laws) or _usual_laws(fits)
+    preferred = preferred_law(fits) if record.noise is None else ""
     chosen.sort(key=lambda name: (name != preferred, fits[name].information_criterion))
     total, done = len(chosen) * step_count(CHAINS, samples // CHAINS), 0
 
@@ -144,6 +143,15 @@ def sample_laws(
         )
         found.append(RatePosterior(fits[name], density.prior, chains, name == preferred))
     return found
+
+
+def _usual_laws(fits: Mapping[str, Fit]) -> list[str]:
+    is_described = any(one.is_described for one in fits.values())
+    return [
+        name
+        for name, one in fits.items()
+        if one.law.states == 1 or one.is_described or (one.is_determined and not is_described)
+    ]
 
 
 class Density:

@@ -55,6 +55,13 @@ module mesoslip_theory_rate_and_state
       & 8.083246795921522_wp, -7.981132988064893_wp, -31.52159432874371_wp, 16.31930543123136_wp, &
       & -6.058818238834054_wp, 0.0_wp], [stages, stages])
 
+   !> Coefficients of the motion within a step, a polynomial of third degree
+   real(wp), parameter :: D(stages, 2) = reshape([ &
+      & 10.12623508344586_wp, -7.487995877610167_wp, -34.80091861555747_wp, &
+      & -7.992771707568823_wp, 1.025137723295662_wp, 0.0_wp, &
+      & -0.6762803392801253_wp, 6.087714651680015_wp, 16.43084320892478_wp, &
+      & 24.76722511418386_wp, -6.594389125716872_wp, 0.0_wp], [stages, 2])
+
    !> Friction, its spring, and the trend.
    type :: friction_type
       !> One of the evolution_ codes, and number of state variables
@@ -83,6 +90,9 @@ module mesoslip_theory_rate_and_state
       real(wp) :: time = 0.0_wp
       !> u and psi
       real(wp) :: state(0:max_states) = 0.0_wp
+      !> Time and state before the last step, and the terms of its polynomial
+      real(wp) :: time_before = 0.0_wp, state_before(0:max_states) = 0.0_wp
+      real(wp) :: terms(0:max_states, 2) = 0.0_wp
       !> Length of the next step, and steps so far
       real(wp) :: step = 0.0_wp
       integer :: steps = 0
@@ -90,6 +100,7 @@ module mesoslip_theory_rate_and_state
       logical :: failed = .false.
    contains
       procedure :: advance
+      procedure :: state_at
       procedure, private :: rates
       procedure, private :: derivatives
       procedure, private :: try_step
@@ -111,7 +122,7 @@ contains
       logical, intent(out) :: failed
 
       type(motion_type) :: motion
-      real(wp) :: begin, load_start, moved, since, first, friction_part
+      real(wp) :: begin, load_start, moved, since, first, friction_part, finish
       integer :: stage, point, last
 
       force = 0.0_wp
@@ -132,21 +143,24 @@ contains
             motion%acceleration = (load%end_velocity(stage) - load%start_velocity(stage)) &
                & / load%duration(stage)
             motion%step = first_step(motion, load%duration(stage))
-            do while (point <= size(times))
-               since = times(point) - begin
-               if (stage < last .and. since > load%duration(stage)) exit
-               call motion%advance(since, tolerance)
+            finish = load%duration(stage)
+            if (stage == last) finish = max(finish, maxval(times) - begin)
+            do while (motion%time < finish .and. point <= size(times))
+               call motion%advance(finish, tolerance)
                if (motion%failed) exit
-               ! The force of the spring and that of friction are equal: this gives X.
-               friction_part = variable_part(friction, motion%state)
-               moved = load_start + (motion%velocity + 0.5_wp * motion%acceleration * since) * since
-               displacement(point) = (k * moved - friction_part + first) / (k + trend)
-               force(point) = friction_part + trend * displacement(point)
-               point = point + 1
+               do while (point <= size(times))
+                  since = times(point) - begin
+                  if (since > motion%time) exit
+                  ! The force of the spring and that of friction are equal: this gives X.
+                  friction_part = variable_part(friction, motion%state_at(since))
+                  moved = load_start &
+                     & + (motion%velocity + 0.5_wp * motion%acceleration * since) * since
+                  displacement(point) = (k * moved - friction_part + first) / (k + trend)
+                  force(point) = friction_part + trend * displacement(point)
+                  point = point + 1
+               end do
             end do
             if (motion%failed .or. point > size(times)) exit
-            call motion%advance(load%duration(stage), tolerance)
-            if (motion%failed) exit
             load_start = load_start + 0.5_wp * (load%start_velocity(stage) &
                & + load%end_velocity(stage)) * load%duration(stage)
             begin = begin + load%duration(stage)
@@ -184,7 +198,7 @@ contains
       end associate
    end function first_step
 
-   !> Move to a time in the stage
+   !> Move by a step, at most to a time in the stage
    subroutine advance(self, time, tolerance)
       class(motion_type), intent(inout) :: self
       !> Time in the stage
@@ -192,38 +206,52 @@ contains
       !> Tolerance of u and psi
       real(wp), intent(in) :: tolerance
 
-      real(wp) :: step, next(0:max_states), error, factor
+      real(wp) :: step, next(0:max_states), terms(0:max_states, 2), error, factor
 
-      do while (self%time < time)
-         ! A step that is cut here does not shorten those after it.
+      do
          step = min(self%step, time - self%time)
-         call self%try_step(step, next, error)
+         call self%try_step(step, next, terms, error)
          self%steps = self%steps + 1
          if (.not. error <= huge(1.0_wp) .or. maxval(abs(next)) > max_exponent) error = huge(1.0_wp)
          error = error / tolerance
          factor = min(5.0_wp, max(0.2_wp, 0.9_wp * max(error, 1.0e-12_wp)**(-0.25_wp)))
          if (error <= 1.0_wp) then
+            self%time_before = self%time
+            self%state_before = self%state
+            self%terms = terms
             self%time = merge(time, self%time + step, step >= time - self%time)
             self%state = next
-            if (step >= self%step .or. factor < 1.0_wp) self%step = step * factor
-         else
-            self%step = step * factor
          end if
-         if (self%state(0) > runaway .or. self%steps > max_steps &
-            & .or. self%time + 0.01_wp * self%step <= self%time) then
-            self%failed = self%time < time
-            if (self%failed) return
-         end if
+         self%step = step * factor
+         self%failed = self%time < time .and. (self%state(0) > runaway &
+            & .or. self%steps > max_steps .or. self%time + 0.01_wp * self%step <= self%time)
+         if (error <= 1.0_wp .or. self%failed) return
       end do
    end subroutine advance
 
-   !> A step, and the estimate of its error
-   pure subroutine try_step(self, step, next, error)
+   !> u and psi at a time within the last step
+   pure function state_at(self, time) result(state)
+      class(motion_type), intent(in) :: self
+      !> Time in the stage
+      real(wp), intent(in) :: time
+      real(wp) :: state(0:max_states)
+
+      real(wp) :: s
+
+      s = (time - self%time_before) / (self%time - self%time_before)
+      state = (1.0_wp - s) * self%state_before + s * (self%state &
+         & + (1.0_wp - s) * (self%terms(:, 1) + s * self%terms(:, 2)))
+   end function state_at
+
+   !> A step, the motion within it, and the estimate of its error
+   pure subroutine try_step(self, step, next, terms, error)
       class(motion_type), intent(in) :: self
       !> Length of the step
       real(wp), intent(in) :: step
       !> u and psi after it
       real(wp), intent(out) :: next(0:max_states)
+      !> Terms of its polynomial
+      real(wp), intent(out) :: terms(0:max_states, 2)
       !> Maximum error of one of them
       real(wp), intent(out) :: error
 
@@ -249,6 +277,7 @@ contains
          k(1:n, stage) = (right(1:n) + down(:n) * k(0, stage)) / diagonal(:n)
       end do
       next = inner + k(:, stages)
+      terms = matmul(k, D)
       error = maxval(abs(k(:, stages)))
    end subroutine try_step
 

@@ -9,28 +9,27 @@ from dataclasses import replace
 import mesoslip
 import numpy as np
 import pytest
+from mesoslip import _core
 from mesoslip.analysis.experiment_stages import Experiment
-from mesoslip.analysis.rate_and_state import Loading, NoiseModel, Points, fit_laws, records_of
+from mesoslip.analysis.rate_and_state import (
+    Loading,
+    NoiseModel,
+    Points,
+    RateAndState,
+    fit_laws,
+    fit_rows,
+    records_of,
+)
 from mesoslip.execution.stop import Stop, StoppedError
 from mesoslip.inference import rate_posterior, rate_tree, sampler
-from mesoslip.inference.rate_posterior import NOISE, Density, sample_laws
+from mesoslip.inference.rate_posterior import NOISE, Density, RatePosterior, prior_of, sample_laws
 from mesoslip.output import writing
+from mesoslip.plots.views import rates
 from test_measured_rates import LAW, UM, trace
 
 # A short record, so that motions are cheap.
 STAGES = [Loading(20, 3 * UM, 3 * UM), Loading(20, 10 * UM, 10 * UM)]
 NAMES = ("a", "b", "slip_distance")
-
-
-@pytest.fixture(scope="module", autouse=True)
-def quick():
-    """Few draws."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(rate_posterior, "CHAINS", 2)
-        patch.setattr(sampler, "WALKERS", 40)
-        patch.setattr(sampler, "BURN_IN", 40)
-        patch.setattr(sampler, "THIN", 3)
-        yield
 
 
 @pytest.fixture(scope="module")
@@ -42,6 +41,18 @@ def record():
 @pytest.fixture(scope="module")
 def fit(record):
     return fit_laws(record)["slip"]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def quick(fit):
+    """Few draws, and least squares of the one record that were made before."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(rate_posterior, "fit_laws", lambda _: {"slip": fit})
+        patch.setattr(rate_posterior, "CHAINS", 2)
+        patch.setattr(sampler, "WALKERS", 40)
+        patch.setattr(sampler, "BURN_IN", 40)
+        patch.setattr(sampler, "THIN", 3)
+        yield
 
 
 @pytest.fixture(scope="module")
@@ -133,22 +144,51 @@ def test_two_state_variables_keep_their_order(record):
     assert density(swapped) == -math.inf
 
 
+def test_a_law_that_does_not_describe_the_record_is_in_every_line():
+    """A record of two state variables: both tables say that one is not enough."""
+    stages = [Loading(40, 3 * UM, 3 * UM), Loading(60, 10 * UM, 10 * UM)]
+    tree = trace(stages=stages, noise=1e-4)
+    parameters = np.array([[0.01, 0.008, 4 * UM, 0.006, 100 * UM, 1e3, 0.0]]).T
+    durations, velocities = (
+        np.array([getattr(one, name) for one in stages]) for name in ("duration", "start_velocity")
+    )
+    times = tree["time"].values
+    force = _core.rate_and_state_motions(
+        "slip",
+        2,
+        np.asfortranarray(parameters),
+        3 * UM,
+        durations,
+        velocities,
+        velocities,
+        times,
+        1e-8,
+    )[0][:, 0]
+    noise = 1e-4 * np.random.default_rng(0).standard_normal(times.size)
+    tree["friction_coefficient"][:] = 0.6 + force + noise
+    experiment = Experiment(tree)
+    rows = fit_rows(experiment, 0, laws=("slip", "slip, two states"))
+    assert [one["verdict"] for one in rows] == ["not described", "described"]
+    assert rows[0]["note"].startswith("does not describe the record: residuals exceed the noise")
+    # The table of the posterior, with starting points as draws.
+    (record,) = records_of(experiment)
+    wrong = fit_laws(replace(record, laws=("slip", "slip, two states")))["slip"]
+    density = Density(wrong)
+    chains = density.starts(np.random.default_rng(0))[:100].reshape(2, 50, -1)
+    found = RatePosterior(wrong, density.prior, chains, is_preferred=False)
+    table = rate_tree.rate_table(rate_tree._build_tree([found], experiment, "", 1))
+    assert {one[-1] for one in table.rows} == {"not described"}
+
+
 @pytest.fixture(scope="module")
 def stored(tmp_path_factory):
-    """A trace of a law of one state in a file, with the record of this law alone."""
+    """The trace in a file."""
     path = tmp_path_factory.mktemp("rates") / "step.nc"
     writing.write(trace(stages=STAGES, noise=1e-4), path)
-
-    def records(*given, **options):
-        found = records_of(*given, **options)
-        return found if isinstance(found, str) else [replace(one, laws=("slip",)) for one in found]
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(rate_tree, "records_of", records)
-        yield path
+    return path
 
 
-def test_the_command_prints_and_writes_a_posterior(command, stored):
+def test_the_command_prints_and_writes_a_posterior(command, stored, monkeypatch):
     """Each line of the table has the verdict; the file opens as those of fits do."""
     path, table = stored.with_name("step.rates.nc"), stored.with_suffix(".csv")
     given = ("--samples", "100", "-o", path, "--table", table, "--quiet")
@@ -169,6 +209,8 @@ def test_the_command_prints_and_writes_a_posterior(command, stored):
     assert table.read_text().startswith("law [1],parameter [1],unit [1],least_squares [see unit]")
     picture, page = stored.with_suffix(".png"), stored.with_suffix(".html")
     assert command("plot", path, "-o", picture)[0] == 0
+    # Pairs take seconds to draw.
+    monkeypatch.setattr(rates, "draw_pairs", lambda *_: None)
     assert command("report", path, "-o", page)[0] == 0
     assert "Rates and states" in page.read_text()
     assert command("fit", path, "--predict", stored)[0] == 2
@@ -180,17 +222,26 @@ def test_the_command_prints_and_writes_a_posterior(command, stored):
 
 def test_a_posterior_as_json(command, stored):
     path = stored.with_name("json.nc")
-    given = ("--samples", "100", "-o", path, "--json", "--law", "slip", "--free-stiffness")
+    given = ("--samples", "100", "-o", path, "--json", "--law", "slip")
     status, out, _ = command("response", stored, "--posterior", *given)
     assert status == 0
     found = json.loads(out)
     rows = {one["parameter"]: one for one in found["rate_and_state_posterior"]}
-    assert rows["stiffness"]["unit"] == "m-1"
+    assert rows["trend"]["unit"] == "m-1"
     assert rows["a"]["percentile_5"] < LAW.a < rows["a"]["percentile_95"]
     assert rows["a"]["prior"] == "logarithmic"
     assert {one["verdict"] for one in rows.values()} == {"described"}
     (assessment,) = found["assessments"]
     assert assessment.startswith("slip law: describes the record within the noise; preferred")
+
+
+def test_an_unknown_stiffness_has_a_prior(record, fit):
+    law = RateAndState(record.points, "slip", math.nan, record.distances, with_trend=True)
+    at = np.append(fit.at, math.log(1e3))
+    free = prior_of(replace(fit, law=law, at=at)).free
+    (stiffness,) = (one for one in free if one.key == "stiffness")
+    assert stiffness.is_logarithmic
+    assert stiffness.low < 1e3 < stiffness.high
 
 
 @pytest.mark.parametrize(

@@ -92,8 +92,9 @@ def friction(truth: Truth, step: float, time: np.ndarray) -> np.ndarray:
     return np.concatenate(found)
 
 
-def trace(truth: Truth, seed: int) -> xr.DataTree:
-    """The experiment as a measured trace."""
+def trace(truth: Truth, seed: int, share: float = 0.0, *, is_known: bool = True) -> xr.DataTree:
+    """The experiment as a measured trace; a share of the variance of its noise is correlated over
+    3 to 100 samples before the step, and its stiffness may be unknown."""
     rng = np.random.default_rng(seed + 10**6)
     # Until the state has evolved, and the spring has followed.
     length = max(20 * truth.slip_distance, 5 * truth.a / truth.stiffness, 5 * UM)
@@ -107,7 +108,15 @@ def trace(truth: Truth, seed: int) -> xr.DataTree:
     )
     load = truth.before * np.minimum(time, step) + truth.after * np.maximum(time - step, 0)
     load = load + 0.02 * UM * rng.standard_normal(time.size)
-    coefficient = friction(truth, step, time) + truth.noise * rng.standard_normal(time.size)
+    noise = rng.standard_normal(time.size)
+    if share > 0:
+        correlation = 3 * 30 ** rng.random() / rates[0]
+        repeat = np.exp(-np.diff(time, prepend=-math.inf) / correlation)
+        correlated = rng.standard_normal(time.size) * np.sqrt(1 - repeat**2)
+        for place in range(1, time.size):
+            correlated[place] += repeat[place] * correlated[place - 1]
+        noise = math.sqrt(1 - share) * noise + math.sqrt(share) * correlated
+    coefficient = friction(truth, step, time) + truth.noise * noise
     root = xr.Dataset(
         {
             "friction_coefficient": (("realization", "time"), coefficient[None]),
@@ -117,7 +126,7 @@ def trace(truth: Truth, seed: int) -> xr.DataTree:
         {
             "origin": "measured",
             "trace": "",
-            "configuration": f"[slider]\nstiffness = {truth.stiffness!r}\n",
+            "configuration": f"[slider]\nstiffness = {truth.stiffness!r}\n" if is_known else "",
         },
     )
     stages = stage_group(drive_stages(time, load))

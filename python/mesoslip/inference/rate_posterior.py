@@ -9,14 +9,21 @@ not known.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mesoslip.analysis.rate_and_state import Fit, NoiseModel, Record, fit_laws, preferred_law
+from mesoslip.analysis.rate_and_state import (
+    Fit,
+    NoiseModel,
+    Record,
+    estimated_noise,
+    fit_laws,
+    preferred_law,
+)
 from mesoslip.errors import FileError, RunError
 from mesoslip.execution.stop import StoppedError, StopRequest
 from mesoslip.inference.prior import FreeParameter, Prior
@@ -88,7 +95,8 @@ def sample_laws(
     """Posteriors of laws of a record, the preferred or likeliest law first.
 
     Without names of laws these are the laws of one state variable, and those of two whose
-    parameters least squares determine.
+    parameters least squares determine, but for those that do not describe a record that others
+    describe.
 
     Raises
     ------
@@ -108,10 +116,8 @@ def sample_laws(
         raise RunError(
             f"the motion of the law {missing[0]!r} along this record cannot be integrated"
         )
-    chosen = list(laws) or [
-        name for name, one in fits.items() if one.law.states == 1 or one.is_determined
-    ]
-    preferred = preferred_law(fits)
+    chosen = list(laws) or _usual_laws(fits)
+    preferred = preferred_law(fits) if record.noise is None else ""
     chosen.sort(key=lambda name: (name != preferred, fits[name].information_criterion))
     total, done = len(chosen) * step_count(CHAINS, samples // CHAINS), 0
 
@@ -137,6 +143,15 @@ def sample_laws(
         )
         found.append(RatePosterior(fits[name], density.prior, chains, name == preferred))
     return found
+
+
+def _usual_laws(fits: Mapping[str, Fit]) -> list[str]:
+    is_described = any(one.is_described for one in fits.values())
+    return [
+        name
+        for name, one in fits.items()
+        if one.law.states == 1 or one.is_described or (one.is_determined and not is_described)
+    ]
 
 
 class Density:
@@ -175,7 +190,8 @@ class Density:
         parameters)."""
         fit, size = self.fit, len(self.law.names)
         low, high = fit.law.bounds()
-        noise = fit.noise
+        # That about this law, which may not be the best one.
+        noise = estimated_noise(fit.law.points, fit.law.residuals(fit.at), fit.law.jacobian(fit.at))
         time = noise.time if noise.time > 0 else math.sqrt(math.prod(self.noise.times))
         for spread in SPREADS:
             away = rng.multivariate_normal(np.zeros(size), fit.covariance, STARTS, method="svd")
@@ -200,9 +216,10 @@ def prior_of(fit: Fit) -> Prior:
     were fitted."""
     law = fit.law
     points, scale = law.points, law.scale
+    low, high = (dict(zip(law.names, np.exp(one), strict=True)) for one in law.bounds())
     steep = MAX_TREND * scale / law.length
     friction = float(np.max(np.abs(points.force)))
-    length = (*law.distances, True, "m")
+    length = (low["slip_distance"], high["slip_distance"], True, "m")
     change = (-friction, friction, False, "N")
     ranges: dict[str, tuple[float, float, bool, str]] = {
         "reference_force": (
@@ -217,7 +234,7 @@ def prior_of(fit: Fit) -> Prior:
         "slip_distance": length,
         "b2": change,
         "slip_distance2": length,
-        "stiffness": (*law.stiffnesses, True, "N/m"),
+        "stiffness": (low.get("stiffness", 0.0), high.get("stiffness", 0.0), True, "N/m"),
         "noise": (MIN_NOISE * scale, scale, True, "N"),
         "noise_share": (0.0, 1.0, False, "1"),
         "noise_time": (*NoiseModel.of(points).times, True, "s"),

@@ -92,7 +92,8 @@ def response_posterior(
         A measured trace, or the output of a run.
     laws
         Evolution laws: "ageing", "slip", "ageing, two states", "slip, two states". By default those
-        of one state variable, and those of two whose parameters least squares determine.
+        of one state variable, and those of two whose parameters least squares determine, but for
+        those that do not describe a record that others describe.
     samples
         Number of draws for each law.
     seed
@@ -373,7 +374,8 @@ def remarks(tree: xr.DataTree) -> dict[str, list[str]]:
     """Assessments of the laws, warnings about their draws, and notes, a sentence each."""
     found: dict[str, list[str]] = {"assessments": [], "warnings": []}
     for data in law_groups(tree):
-        law = f"{data.attrs['law']} law"
+        name, comma, states = str(data.attrs["law"]).partition(",")
+        law = f"{name} law{comma}{states}"
         found["assessments"].append(f"{law}: {data.attrs['assessment']}")
         texts = str(data.attrs["warnings"]).split("\n")
         found["warnings"] += [f"{law}: {one}" for one in texts if one]

@@ -1,7 +1,7 @@
 """Rate-and-state friction: laws fitted to records of runs and to measured traces."""
 
 from mesoslip.analysis.rate_and_state.law import LAWS, RateAndState
-from mesoslip.analysis.rate_and_state.noise import NoiseModel, known_noise
+from mesoslip.analysis.rate_and_state.noise import NoiseModel, estimated_noise, known_noise
 from mesoslip.analysis.rate_and_state.points import (
     Loading,
     Points,
@@ -23,6 +23,7 @@ __all__ = [
     "RateAndState",
     "Record",
     "assessment",
+    "estimated_noise",
     "fit_laws",
     "fit_rows",
     "fitted_trend",

@@ -117,17 +117,19 @@ def averaged_covariance(start: Array, end: Array, length: float) -> Array:
     """Covariance of means over intervals of a process of variance 1 with the correlation
     exp(-x/length), shape (intervals, intervals)."""
     size = np.maximum((end - start) / length, 1e-9)
-    damped = -np.expm1(-size) / size
+    change = np.expm1(-size)
+    damped = -change / size
     gap = np.maximum(start[:, None], start[None, :]) - np.minimum(end[:, None], end[None, :])
     covariance: Array = np.outer(damped, damped) * np.exp(-np.maximum(gap, 0.0) / length)
-    np.fill_diagonal(covariance, _mean_square(size))
+    np.fill_diagonal(covariance, _mean_square(size, change))
     return covariance
 
 
-def _mean_square(size: Array) -> Array:
-    """Mean square of means of the same process over intervals of lengths over its own."""
+def _mean_square(size: Array, change: Array) -> Array:
+    """Mean square of means of the same process over intervals of lengths over its own, with
+    exp(-size) - 1."""
     small = size < 1e-3
-    mean: Array = np.where(small, 1 - size / 3, 2 * (size + np.expm1(-size)) / size**2)
+    mean: Array = np.where(small, 1 - size / 3, 2 * (size + change) / size**2)
     return mean
 
 
@@ -178,10 +180,11 @@ class NoiseModel:
 
         length, variance, part = (one[:, None] for one in (time, deviation**2, share))
         size = np.maximum((self.end - self.start) / length, 1e-9)
-        damped = -np.expm1(-size) / size
+        change = np.expm1(-size)
+        damped = -change / size
         decay = np.exp(-np.maximum(self.start[1:] - self.end[:-1], 0.0) / length)
-        factor = damped[:, 1:] / damped[:, :-1] * decay * np.exp(-size[:, :-1])
-        diagonal = variance * (part * _mean_square(size) + (1 - part) / self.count)
+        factor = damped[:, 1:] / damped[:, :-1] * decay * (1 + change[:, :-1])
+        diagonal = variance * (part * _mean_square(size, change) + (1 - part) / self.count)
         beside = variance * part * damped[:, 1:] * damped[:, :-1] * decay
         before = diagonal[:, :-1]
         rest = residual.copy()

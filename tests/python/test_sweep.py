@@ -42,13 +42,16 @@ GRID = {
     "slider.stiffness": {"from": "50 N/m", "to": "200 N/m", "points": 3, "spacing": "logarithmic"},
 }
 
-# Measures of what theory says.
+# Measures of what theory says, and of an interface with a length.
 PREDICTED = {
+    "front_prestress",
+    "steady_front_speed_ratio",
     "growth_rate",
     "stable_dephased",
     "critical_stiffness_ratio",
     "waiting_over_damping",
 }
+FRONTS = {"front_type", "front_speed_ratio"}
 
 
 def tables(**sweep):
@@ -158,7 +161,7 @@ def test_every_measure_of_a_run_with_known_slips():
         "peak_variation": 1 / 4,
     }
     # What theory says, what a regime is judged by, and exponents have tests of their own.
-    others = {*REGIME, *PREDICTED, "lyapunov_exponent", "lyapunov_error", "map_exponent"}
+    others = {*REGIME, *PREDICTED, *FRONTS, "lyapunov_exponent", "lyapunov_error", "map_exponent"}
     own = {name: measure for name, measure in MEASURES.items() if name not in others}
     found = {name: measure.function(run) for name, measure in own.items()}
     assert found.keys() == expected.keys()

@@ -64,6 +64,16 @@ def test_soft_contacts_slow_a_front_down_by_the_closed_form(contacts):
     assert np.all(ratios > np.sqrt(1 - time**2))
 
 
+def test_a_front_without_inertia_is_in_balance_of_the_springs_from_above():
+    """The springs κ_t hold block -n behind the front, u = (τ/κ_t)(1 - λⁿ), λ + 1/λ = 2 + κ_t; the
+    first pinned block bears τ + u."""
+    top = 0.01
+    decay = brentq(lambda one: one + 1 / one - 2 - top, 0.5, 1 - 1e-9)
+    balance = 1 / (1 + (1 - decay) / top)
+    slow = front(drag=1.0, top=top).stress_ratio(SOUND / 5000)
+    assert slow == pytest.approx(balance, rel=1e-4)
+
+
 def plain_front(
     stress: float, drag: float = 0, viscosity: float = 0, contacts: float = 0, top: float = 0
 ) -> float:

@@ -33,6 +33,7 @@ from .theory.contacts.plain_sliding import SteadySliding
 from .theory.curve import curve
 from .theory.derived import derived
 from .theory.slip_onset import onset
+from .theory.steady_front import SteadyFront
 from .theory.track_response import TrackResponse
 
 __all__ = [
@@ -45,6 +46,7 @@ __all__ = [
     "Processes",
     "Realization",
     "RunError",
+    "SteadyFront",
     "SteadySliding",
     "Threads",
     "ThresholdLaw",

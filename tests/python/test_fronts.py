@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 from kinds import configuration
 from mesoslip import Config, ConfigError, FileError
-from mesoslip.analysis.fronts import EVENTS, fronts_of, static_balance
+from mesoslip.analysis.fronts import EVENTS, FRONT_TYPES, first_front, fronts_of, static_balance
+from mesoslip.campaign.measures import MEASURES, RunView
 from mesoslip.command_line.main import app
 from mesoslip.plots.draw import movie_of
 from mesoslip.plots.views.base import Options
@@ -230,6 +231,27 @@ def test_the_function_and_its_tables_agree(tree, tmp_path):
     assert len(rows) == found.fronts["event"].size + 2 + found.events["event"].size
     answer = json.loads(json.dumps(found.to_json()))
     assert sum(one["events"] for one in answer["statistics"].values()) == len(answer["events"])
+
+
+def test_types_of_fronts_are_those_of_their_speeds(tree):
+    columns = fronts_of(tree).fronts
+    names = np.array(FRONT_TYPES)[columns["front_type"]]
+    arrested = columns["arrest"] == ARRESTS.index("arrested")
+    np.testing.assert_array_equal(names == "arrested", arrested)
+    known = np.isfinite(columns["speed_ratio"])
+    np.testing.assert_array_equal(names == "unresolved", ~known & ~arrested)
+    for name, low, high in (("slow", 0, 0.1), ("subsonic", 0.1, 1), ("supersonic", 1, np.inf)):
+        ratio = columns["speed_ratio"][names == name]
+        assert np.all((ratio >= low) & (ratio < high))
+    # A sweep takes the longest front of the first event.
+    front = first_front(tree)
+    assert front["event"] == 0
+    assert front["length"] == columns["length"][columns["event"] == 0].max()
+    view = RunView(tree, 0.0)
+    assert MEASURES["front_type"].function(view) == front["front_type"]
+    np.testing.assert_array_equal(
+        MEASURES["front_speed_ratio"].function(view), front["speed_ratio"]
+    )
 
 
 @pytest.mark.parametrize("view", ["fronts", "precursors", "front-speeds", "interface-stress"])

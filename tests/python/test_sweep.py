@@ -20,6 +20,7 @@ import pytest
 import xarray as xr
 from conftest import ROOT, klein_tables, long
 from mesoslip import Config, ConfigError, FileError
+from mesoslip.analysis.fronts import FRONT_TYPES
 from mesoslip.analysis.regime import REGIME, regimes
 from mesoslip.campaign.measures import MEASURES
 from mesoslip.campaign.point import Outcome, combination_key, point_name
@@ -42,13 +43,16 @@ GRID = {
     "slider.stiffness": {"from": "50 N/m", "to": "200 N/m", "points": 3, "spacing": "logarithmic"},
 }
 
-# Measures of what theory says.
+# Measures of what theory says, and of an interface with a length.
 PREDICTED = {
+    "front_prestress",
+    "steady_front_speed_ratio",
     "growth_rate",
     "stable_dephased",
     "critical_stiffness_ratio",
     "waiting_over_damping",
 }
+FRONTS = {"front_type", "front_speed_ratio"}
 
 
 def tables(**sweep):
@@ -158,7 +162,7 @@ def test_every_measure_of_a_run_with_known_slips():
         "peak_variation": 1 / 4,
     }
     # What theory says, what a regime is judged by, and exponents have tests of their own.
-    others = {*REGIME, *PREDICTED, "lyapunov_exponent", "lyapunov_error", "map_exponent"}
+    others = {*REGIME, *PREDICTED, *FRONTS, "lyapunov_exponent", "lyapunov_error", "map_exponent"}
     own = {name: measure for name, measure in MEASURES.items() if name not in others}
     found = {name: measure.function(run) for name, measure in own.items()}
     assert found.keys() == expected.keys()
@@ -318,6 +322,29 @@ def test_lines_of_theory_are_smooth_and_scales_follow_the_data():
     shown = [one for one in regime.get_xticklabels() if one.get_text()]
     boxes = [one.get_window_extent() for one in shown]
     assert all(one.x1 < two.x0 for one, two in itertools.pairwise(boxes))
+
+
+def test_types_of_fronts_have_the_speeds_of_steady_ones_as_boundaries():
+    drags, stiffnesses = np.logspace(0, 2, 5), np.logspace(0, 1, 4)
+    dimensions = ("contacts.drag", "slider.stiffness", "realization")
+    ratio = (3 / (drags[:, None] * stiffnesses))[..., None]
+    flags = {"flag_meanings": " ".join(FRONT_TYPES)}
+    data = xr.Dataset(
+        {
+            "status": (dimensions, 0 * ratio),
+            "front_type": (dimensions, 1.0 + (ratio > 0.1) + (ratio > 1), flags),
+            "steady_front_speed_ratio": (dimensions, ratio, {"units": "1"}),
+        },
+        {"contacts.drag": drags, "slider.stiffness": stiffnesses, "realization": [0]},
+        {"configuration": ""},
+    )
+    (axes, *bar) = mesoslip.plot(data).axes
+    assert len(bar) == 1
+    lines = [one for one in axes.collections if hasattr(one, "levels")]
+    assert len(lines) == 2
+    for line, value in zip(lines, (1, 0.1), strict=True):
+        x, y = np.concatenate([path.vertices for path in line.get_paths()]).T
+        np.testing.assert_allclose(x * y, 3 / value, rtol=0.05)
 
 
 def test_names_can_be_drawn():

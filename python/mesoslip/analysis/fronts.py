@@ -30,10 +30,21 @@ Array = NDArray[np.float64]
 
 NO_FRONTS = 'the output has no fronts: they are recorded with slider.kind = "interface"'
 
+# Types of fronts: those that stop on the way, those of a known speed, and all others. Slow ones are
+# slower than this part of the velocity of sound.
+FRONT_TYPES = ("arrested", "slow", "subsonic", "supersonic", "unresolved")
+SLOW = 0.1
+
 # Columns of fronts that are not in the group of an output.
 ALL_FRONTS = Group(
     FRONTS,
     speed_ratio=Meaning("1", "size of the speed over that of sound in the row of blocks"),
+    front_type=Meaning(
+        "1",
+        "type of the front: arrested on the way; else by its speed, slow below a tenth of sound",
+        np.int8,
+        further={"flag_meanings": " ".join(FRONT_TYPES)},
+    ),
 )
 EVENTS = Group(
     FRONTS.subset("realization_index", "event", "start_time", "end_time", "kind"),
@@ -67,8 +78,9 @@ FRONT_HEADS = {
     "speed_ratio": ("speed/c", "1"),
     "stress_ratio_before": ("stress ratio", "1"),
     "arrest": ("end", ""),
+    "front_type": ("type", ""),
 }
-WORDS = {"kind": KINDS, "arrest": ARRESTS}
+WORDS = {"kind": KINDS, "arrest": ARRESTS, "front_type": FRONT_TYPES}
 DIGITS = 4
 
 
@@ -235,8 +247,26 @@ def fronts_of(tree: Tree, name: str = "the output", realization: int | None = No
         columns = {one: values[mine] for one, values in columns.items()}
     sound = slider.block_spacing / slider.block_time if slider.block_time > 0 else np.nan
     columns["speed_ratio"] = np.abs(columns["speed"]) / sound
+    columns["front_type"] = _types(columns["arrest"], columns["speed_ratio"])
     events = _events(tree, columns, slider.block_spacing)
     return Fronts(columns, events, sound, slider.block_count)
+
+
+def _types(arrest: NDArray[Any], speed_ratio: Array) -> NDArray[Any]:
+    """Indices in `FRONT_TYPES`."""
+    by_speed = 1 + np.searchsorted([SLOW, 1.0], speed_ratio, "right")
+    by_speed[np.isnan(speed_ratio)] = FRONT_TYPES.index("unresolved")
+    return np.where(arrest == ARRESTS.index(ARRESTED), 0, by_speed).astype(np.int8)
+
+
+def first_front(tree: Tree) -> dict[str, float]:
+    """Columns of the longest front in the first event of a run; none without events."""
+    found = fronts_of(tree).fronts
+    first = np.flatnonzero(found["event"] == 0)
+    if not first.size:
+        return {}
+    longest = first[np.argmax(found["length"][first])]
+    return {name: float(values[longest]) for name, values in found.items()}
 
 
 def _events(
@@ -346,7 +376,8 @@ def fronts(output: OutputLike) -> xr.DataTree:
     -------
     xarray.DataTree
         Group ``fronts``, dimension ``front``: the columns of that group of the output, and
-        ``speed_ratio``, the size of the speed over that of sound. Group ``events``, dimension
+        ``speed_ratio``, the size of the speed over that of sound, and the ``front_type`` (0
+        arrested, 1 slow, 2 subsonic, 3 supersonic, 4 without a speed). Group ``events``, dimension
         ``event_row``: ``kind`` (0 precursor, 1 whole), ``length`` and ``block_count`` that
         detached, the ``spring_force`` before, ``force_drop``, and the mean stress over strength
         before. SI. Attribute ``sound_velocity`` [m/s].

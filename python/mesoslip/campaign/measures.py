@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mesoslip.analysis.fronts import FRONT_TYPES, first_front
 from mesoslip.analysis.lyapunov import lyapunov
 from mesoslip.analysis.regime import NAMES, REGIME, regimes
 from mesoslip.analysis.return_map import map_exponent as exponent_of_map
@@ -48,6 +49,11 @@ class RunView:
         """The regime and the statistics that determine it."""
         data = regimes(self.tree)
         return {name: float(data[name].values[0]) for name in REGIME}
+
+    @cached_property
+    def front(self) -> dict[str, float]:
+        """Columns of the longest front in the first event of the whole run."""
+        return first_front(self.tree) if "fronts" in self.tree.children else {}
 
     @cached_property
     def exponent(self) -> xr.DataTree:
@@ -111,12 +117,14 @@ class Measure:
 MEASURES: dict[str, Measure] = {}
 
 
-def measure(units: str, long_name: str) -> Callable[[Function], Function]:
+def measure(
+    units: str, long_name: str, flags: tuple[str, ...] = ()
+) -> Callable[[Function], Function]:
     """Make a function the measure of its name."""
 
     def add(function: Function) -> Function:
         name = function.__name__
-        MEASURES[name] = Measure(name, function, units, long_name)
+        MEASURES[name] = Measure(name, function, units, long_name, flags)
         return function
 
     return add
@@ -240,6 +248,26 @@ def mean_avalanche_size(run: RunView) -> float:
 @measure("1", "size of the largest avalanche")
 def max_avalanche_size(run: RunView) -> float:
     return _max(run.catalogue("avalanches", "size"))
+
+
+@measure("1", "type of the longest front in the first event of the whole run", FRONT_TYPES)
+def front_type(run: RunView) -> float:
+    return run.front.get("front_type", np.nan)
+
+
+@measure("1", "speed of the longest front in the first event of the whole run, over that of sound")
+def front_speed_ratio(run: RunView) -> float:
+    return run.front.get("speed_ratio", np.nan)
+
+
+@measure("1", "stress over strength ahead of the first front from the edge, in static balance")
+def front_prestress(run: RunView) -> float:
+    return predictions.front_prestress(run.tree)
+
+
+@measure("1", "speed of a steady front under that prestress, over that of sound, by theory")
+def steady_front_speed_ratio(run: RunView) -> float:
+    return predictions.steady_front_speed_ratio(run.tree)
 
 
 @measure("s-1", "growth rate of small perturbations of steady sliding with delay, by linear theory")

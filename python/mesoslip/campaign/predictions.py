@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mesoslip.configuration.config import Config
-from mesoslip.errors import RunError
+from mesoslip.errors import ConfigError, RunError
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from mesoslip.theory.linear_stability import LinearStability
+    from mesoslip.theory.steady_front import SteadyFront
 
 # Length of the force curve in mean breaking stretches; its steepest descent is the first one.
 CURVE_LENGTH = 3.0
@@ -84,3 +85,26 @@ def _critical_stiffness(config: Config) -> float:
     from mesoslip.theory.force_curve import ForceCurve
 
     return ForceCurve(config).K_star[0]
+
+
+def front_prestress(tree: xr.DataTree) -> float:
+    """Stress over strength of the blocks far from the edge as the first one breaks."""
+    front = _steady_front(tree)
+    return math.nan if front is None else front.prestress
+
+
+def steady_front_speed_ratio(tree: xr.DataTree) -> float:
+    """Speed of a steady front under that prestress, over that of sound."""
+    front = _steady_front(tree)
+    if front is None:
+        return math.nan
+    return float(front.speed(front.prestress)) / front.sound_velocity
+
+
+def _steady_front(tree: xr.DataTree) -> SteadyFront | None:
+    from mesoslip.theory.steady_front import SteadyFront
+
+    try:
+        return SteadyFront(_configuration(tree))
+    except ConfigError:
+        return None

@@ -1,4 +1,4 @@
-"""Theoretical boundaries of regimes in pictures of sweeps."""
+"""Theoretical boundaries of regimes and of types of fronts in pictures of sweeps."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from matplotlib.transforms import ScaledTranslation
 from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
+from mesoslip.analysis.fronts import SLOW
 from mesoslip.plots.sweep_axis import SweptKey
 
 if TYPE_CHECKING:
@@ -22,8 +23,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-# The measure in whose pictures the boundaries are drawn.
-REGIME = "regime"
+# The measures in whose pictures boundaries are drawn.
+REGIME, FRONT_TYPE = "regime", "front_type"
 # Maximum ratio of the sizes of an excess on both sides of a boundary for a cubic through them; the
 # power that compresses others, as growth rates on both sides of a boundary differ by decades; and
 # number of points of a line between two edges.
@@ -35,7 +36,8 @@ LINES_BELOW = 3.6
 
 
 class Boundary(NamedTuple):
-    """The line on which a measure, which may be smooth or positive, has a value."""
+    """The line on which a measure, which may be smooth or positive, has a value; it is drawn into
+    the picture of a choice."""
 
     measure: str
     value: float
@@ -43,11 +45,12 @@ class Boundary(NamedTuple):
     label: str
     is_smooth: bool = True
     is_positive: bool = False
+    choice: str = REGIME
 
     def excess(self, data: xr.Dataset, keys: list[SweptKey]) -> Array:
         """The mean of the measure over realizations beyond the value, in the order of the keys; of
         a positive one in logarithms."""
-        dimensions = data[REGIME].isel(realization=0).dims
+        dimensions = data[self.choice].isel(realization=0).dims
         mean = data[self.measure].mean("realization").transpose(*dimensions).values
         mean = mean[np.ix_(*(key.order for key in keys))]
         excess: Array = mean - self.value
@@ -61,18 +64,42 @@ BOUNDARIES = (
     Boundary("stable_dephased", 0.5, "-", "the same, dephased contacts", is_smooth=False),
     Boundary("critical_stiffness_ratio", 1.0, "--", "$K = K^*$", is_positive=True),
     Boundary("waiting_over_damping", 1.0, ":", r"$\tau_{ss} \eta_S = 1$", is_positive=True),
+    Boundary(
+        "steady_front_speed_ratio",
+        1.0,
+        "-",
+        "steady front as fast as sound",
+        is_positive=True,
+        choice=FRONT_TYPE,
+    ),
+    Boundary(
+        "steady_front_speed_ratio",
+        SLOW,
+        "--",
+        "a tenth of that",
+        is_positive=True,
+        choice=FRONT_TYPE,
+    ),
 )
 
 
-def draw_contours(axes: Axes, data: xr.Dataset, keys: list[SweptKey]) -> list[Line2D]:
-    """Draw the boundaries that a map over two keys crosses; returns lines for a legend.
+def _boundaries(data: xr.Dataset, choice: str) -> list[Boundary]:
+    """The boundaries in the picture of a choice whose measures a sweep has."""
+    return [one for one in BOUNDARIES if one.choice == choice and one.measure in data]
+
+
+def boundary_measures(names: list[str]) -> set[str]:
+    """Measures of a sweep that are drawn as boundaries, into the pictures of its others."""
+    return {one.measure for one in BOUNDARIES if one.choice in names}
+
+
+def draw_contours(axes: Axes, data: xr.Dataset, choice: str, keys: list[SweptKey]) -> list[Line2D]:
+    """Draw the boundaries that the map of a choice crosses; returns lines for a legend.
 
     A line crosses the edges between neighbours of different signs once, and no others.
     """
     drawn = []
-    for one in BOUNDARIES:
-        if one.measure not in data:
-            continue
+    for one in _boundaries(data, choice):
         lines = _lines(one, one.excess(data, keys), keys)
         if lines:
             curves = [_curve(line, keys) for line in lines]
@@ -150,12 +177,10 @@ def _curve(line: Array, keys: list[SweptKey]) -> Array:
     return np.column_stack([key.values_at(one) for key, one in zip(keys, fine.T, strict=True)])
 
 
-def draw_crossings(axes: Axes, data: xr.Dataset, key: SweptKey) -> list[Line2D]:
-    """Draw the boundaries along one key; returns lines for a legend."""
+def draw_crossings(axes: Axes, data: xr.Dataset, choice: str, key: SweptKey) -> list[Line2D]:
+    """Draw the boundaries of a choice along one key; returns lines for a legend."""
     drawn = []
-    for one in BOUNDARIES:
-        if one.measure not in data:
-            continue
+    for one in _boundaries(data, choice):
         excess = one.excess(data, [key])
         with np.errstate(invalid="ignore"):
             changes = np.flatnonzero((excess[1:] < 0) != (excess[:-1] < 0))

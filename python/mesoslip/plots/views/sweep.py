@@ -12,7 +12,7 @@ from matplotlib.colors import Normalize
 from matplotlib.lines import Line2D
 
 from mesoslip.errors import FileError
-from mesoslip.plots.boundaries import BOUNDARIES, REGIME, add_legend, draw_contours, draw_crossings
+from mesoslip.plots.boundaries import add_legend, boundary_measures, draw_contours, draw_crossings
 from mesoslip.plots.key_names import name_of, symbol_or_name
 from mesoslip.plots.printing import current, is_narrow
 from mesoslip.plots.style import Canvas, canvas, plain, write_title
@@ -114,8 +114,8 @@ def draw_panel(axes: Axes, tree: xr.DataTree, options: Options) -> None:
 def measures(data: xr.Dataset) -> list[str]:
     """Measures of a sweep that have a picture: with the regime, not those of its boundaries."""
     names = [str(name) for name in data.data_vars if name != "status"]
-    lines = {one.measure for one in BOUNDARIES}
-    return [name for name in names if REGIME not in names or name not in lines]
+    lines = boundary_measures(names)
+    return [name for name in names if name not in lines]
 
 
 def _known(data: xr.Dataset, name: str) -> str:
@@ -148,15 +148,14 @@ class _Panel(NamedTuple):
         data, keys = self.data, self.keys
         if len(keys) == 2:
             lines = draw_map(axes, self.measured, keys, norm)
-            if self.name == REGIME:
-                lines += draw_contours(axes, data, keys)
+            lines += draw_contours(axes, data, self.name, keys)
         elif DIRECTION in data.dims:
             lines = draw_directions(axes, data, self.measured, keys[0])
             data = data.isel({DIRECTION: 0})
         else:
             lines = draw_line(axes, self.measured, keys[0], is_line=self.is_line)
-        if len(keys) == 1 and self.name == REGIME:
-            lines += draw_crossings(axes, data, keys[0])
+        if len(keys) == 1:
+            lines += draw_crossings(axes, data, self.name, keys[0])
         for key, which in zip(keys, "xy", strict=False):
             key.apply(axes, which)
             if len(keys) == 2:

@@ -486,6 +486,10 @@ def test_onsets_have_dimensions_or_the_reason_why_there_is_none(klein):
     least = melting["relative_force_drop"].values.min() * static * 1e6
     assert line.get_ydata().min() == pytest.approx(least)
     assert axes.get_xlabel().endswith("(ms)")
+    # Sequential breaking ends early, and is enlarged.
+    (inset,) = axes.child_axes
+    assert 0.5 < inset.lines[0].get_xdata()[-1] / inset.get_xlim()[1] < 1
+    assert 0.5 < inset.lines[0].get_ydata()[-1] / inset.get_ylim()[0] < 1
     none = mesoslip.plot(mesoslip.onset(klein(slider__stiffness=1e6)))
     assert "there is no onset" in none.axes[0].texts[0].get_text()
     # A curve and an onset have neither realizations nor times.

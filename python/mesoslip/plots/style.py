@@ -31,6 +31,8 @@ CONTACT: dict[str, Any] = {"color": "black", "label": "contact force $F$"}
 OTHERS: dict[str, Any] = {"color": "0.75", "linewidth": 0.5, "zorder": 1}
 # Measured points with errors.
 POINTS: dict[str, Any] = {"fmt": "o", "color": "black", "markersize": 3}
+# A law fitted to a record, as a broad line below it that does not hide its peaks.
+FITTED: dict[str, Any] = {"color": RED, "linewidth": 2.4, "alpha": 0.6, "zorder": 1.5}
 # Characters in an inch of a line of the size 8.
 CHARACTERS_PER_INCH = 16
 # Width of the ticks and labels beside axes [inch].
@@ -53,8 +55,9 @@ def titles(
     for a legend between title and axes.
     """
     width = axes_width(axes)
-    texts = [*headings(tree, characters(width)), about]
-    lines = [wrapped(text, width, max_lines=2) for text in texts if text]
+    title, changes = headings(tree, characters(width))
+    lines = [wrapped(title, width, max_lines=2), changes, wrapped(about, width, max_lines=2)]
+    lines = [one for one in lines if one]
     lines += [mathematical] if mathematical else []
     lines += [""] * legend_rows(axes) if beside_legend else []
     axes.set_title("\n".join(lines), loc="left")
@@ -65,19 +68,19 @@ def write_title(axes: Axes, text: str) -> None:
     axes.set_title(wrapped(text, axes_width(axes)), loc="left")
 
 
-def headings(tree: Tree, room: int) -> list[str]:
+def headings(tree: Tree, room: int) -> tuple[str, str]:
     """The title of an output and its changes from its base, as far as they fit into a number of
     characters; empty if the picture has a title."""
     if current().title is not None:
-        return []
+        return "", ""
     title = tree.attrs.get("title", "")
     if tree.attrs.get("complete") == "false":
         title = f"{title} ({tree.attrs['comment']})"
     base = tree.attrs.get("base_configuration")
     if base is None:
-        return [plain(title)]
+        return plain(title), ""
     config = Config.from_toml(tree.attrs["configuration"])
-    return [plain(title), changes_in_a_line(config, Config.from_toml(base), room)]
+    return plain(title), changes_in_a_line(config, Config.from_toml(base), room)
 
 
 def filled(text: str, width: float, max_lines: int | None = None) -> str:

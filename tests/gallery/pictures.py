@@ -8,7 +8,7 @@ def _view(name: str, *options: str) -> tuple[str, ...]:
 
 
 VELOCITIES = ("velocity-1", "velocity-2", "velocity-5")
-NARROW = ("--width", "8.6 cm", "--letters")
+NARROW = ("--width", "aps-1", "--letters")
 
 PICTURES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "run": (("klein",), ()),
@@ -77,6 +77,12 @@ PICTURES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "fit": (("fit",), ()),
     "fit-narrow": (("fit",), NARROW),
     "misfit": (("fit",), _view("misfit")),
+    "misfit-narrow": (("fit",), _view("misfit", *NARROW)),
+    "strokes-narrow": (("reciprocating",), _view("strokes", *NARROW)),
+    "response-narrow": (("holds",), _view("response", *NARROW)),
+    "response-measured-narrow": (("basalt",), _view("response", *NARROW)),
+    "avalanches-narrow": (("sizes",), _view("avalanches", *NARROW)),
+    "run-nature": (("klein",), ("--width", "nature-2", "--letters")),
 }
 
 # Movies: an output, and the view of it.

@@ -31,6 +31,7 @@ from mesoslip.analysis.avalanche_sizes import (
 from mesoslip.analysis.avalanche_sizes.tally import tally_of
 from mesoslip.errors import MesoslipError
 from mesoslip.plots.views import avalanches as avalanche_view
+from mesoslip.quantities import with_error
 from scipy import optimize, special, stats
 
 # One form only, the plain law with an exponential cutoff.
@@ -742,8 +743,21 @@ def test_a_rejected_fit_is_said_to_be(tmp_path, capsys, monkeypatch):
         assert math.isfinite(answer[f"{law}_ratio"])
 
     run = mesoslip.open_output(output)
-    title = mesoslip.plot(run, view="avalanches").axes[0].get_title("left")
-    assert "rejected" not in title
-    assert f"fitted to $s$ ≥ {tree['min_fitted_size']:g}, " in title
+    axes = mesoslip.plot(run, view="avalanches").axes[0]
+    (law,) = (one.get_text() for one in axes.get_legend().get_texts())
+    assert "rejected" not in law
+    assert rf"$\tau$ = {with_error(tree['exponent'], tree['exponent_error'])}" in law
+    assert f"$s$ ≥ {tree['min_fitted_size']:g}, " in law
+    # The law is a line over its range; each bin has the error of its count.
+    line = next(one for one in axes.lines if one.get_label() == law)
+    assert line.get_xdata().min() >= tree["min_fitted_size"]
+    (bars,) = axes.collections
+    bins = logarithmic_bins(avalanche_view.scaling_sizes(run))
+    for (_, low), (_, high) in bars.get_segments():
+        assert 0 < low < high
+    many = np.argmax(bins.count)
+    heights = np.ptp(bars.get_segments()[many][:, 1]) / 2
+    assert heights == pytest.approx(bins.density_error[many], rel=0.1)
     monkeypatch.setattr(avalanche_view, "fit_power_law", lambda sizes: fit_plain(sizes, 1))
-    assert "rejected" in mesoslip.plot(run, view="avalanches").axes[0].get_title("left")
+    axes = mesoslip.plot(run, view="avalanches").axes[0]
+    assert "rejected" in axes.get_legend().get_texts()[0].get_text()

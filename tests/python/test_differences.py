@@ -27,13 +27,13 @@ def test_a_configuration_knows_what_it_was_laid_over(tmp_path):
     assert plain.base is None
     changed = mesoslip.Config.load(KLEIN, ["contacts.delay=2 ms"])
     assert changed.base == plain
-    assert differences.changes(changed, plain) == ["contacts.delay = 2 ms (was 500 µs)"]
+    assert differences.changes(changed, plain) == [("contacts.delay", ("2 ms", "500 µs"))]
     (tmp_path / "mine.toml").write_text(f'base = "{KLEIN}"\n[slider]\nmass = "2 g"\n')
     mine = mesoslip.Config.load(tmp_path / "mine.toml", ["run.seed=7"])
     assert mine.base == plain
     assert differences.changes(mine, plain) == [
-        "slider.mass = 2 g (was 1.47 g)",
-        "run.seed = 7 (was 1)",
+        ("slider.mass", ("2 g", "1.47 g")),
+        ("run.seed", ("7", "1")),
     ]
     assert plain.replace("run.seed=3").base == plain
     # What it was laid over is of no consequence.
@@ -90,7 +90,8 @@ def test_labels_name_what_differs(klein):
 def test_stages_are_reported(klein):
     stages = [{"duration": 4, "velocity": 1e-7}, {"duration": 1, "velocity": 0}]
     turned = klein(drive={"stage": stages})
-    assert differences.changes(turned, klein()) == ["drive.stage = [(4 s, 100 nm/s), (1 s, 0 m/s)]"]
+    (change,) = differences.changes(turned, klein())
+    assert change == ("drive.stage", ("[(4 s, 100 nm/s), (1 s, 0 m/s)]", differences.MISSING))
 
 
 def test_changes_of_the_program_are_none_of_the_user(tmp_path):
@@ -101,7 +102,7 @@ def test_changes_of_the_program_are_none_of_the_user(tmp_path):
     for config in (changed, mesoslip.Config.load(tmp_path / "mine.toml")):
         cycle = master_equation(config)
         measured = config.adapted(lambda one: one.replace({"run.duration": 14.0}))
-        stiffer = "slider.stiffness = 300 N/m (was 97 N/m)"
+        stiffer = ("slider.stiffness", ("300 N/m", "97 N/m"))
         for one in (cycle, started(cycle, "steady")):
             assert differences.changes(one, one.base) == [stiffer]
         assert differences.changes(measured, measured.base) == [stiffer]

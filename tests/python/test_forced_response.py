@@ -141,5 +141,11 @@ def test_static_friction_is_the_maximum_of_the_force_curve(klein):
 
 def test_the_picture_shows_displacement_and_creep(creeping, tmp_path):
     path = tmp_path / "creep.svg"
-    mesoslip.plot(creeping, path, view="response")
+    figure = mesoslip.plot(creeping, path, view="response")
+    force = figure.axes[1]
+    assert force.get_ylabel() == "force over $F_s$"
+    # The right axis is drawn, and starts at no force.
+    assert force.spines["right"].get_visible()
+    low, high = force.get_ylim()
+    assert low == 0 < force.lines[0].get_ydata().max() < high
     assert path.stat().st_size > 10_000

@@ -16,6 +16,7 @@ from mesoslip.campaign.measures import MEASURES, RunView
 from mesoslip.command_line.main import app
 from mesoslip.plots.draw import movie_of
 from mesoslip.plots.views.base import Options
+from mesoslip.plots.views.fronts import picture_of
 from mesoslip.simulation.fronts import (
     ARRESTS,
     CLOSED_AFTER,
@@ -268,6 +269,14 @@ def test_views_of_an_interface_are_drawn(tree, view):
     for line, values in drawn:
         inside = np.mean((np.asarray(values) >= low) & (np.asarray(values) <= high))
         assert inside > 0.5, line.get_label()
+
+
+def test_the_window_of_an_event_starts_with_its_first_slip(tree):
+    """A tenth of it at most is before the first rupture."""
+    picture = picture_of(tree, Options())
+    times, (low, high) = picture.ruptures["rupture_time"], picture.window
+    first = times[(times >= low) & (times <= high)].min()
+    assert (first - low) < 0.1 * (high - low)
 
 
 def test_the_precursors_drawn_are_the_events(tree):

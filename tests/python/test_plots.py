@@ -15,13 +15,16 @@ from conftest import ROOT, long
 from kinds import configuration
 from matplotlib.figure import Figure
 from mesoslip.command_line.view_summaries import summaries
+from mesoslip.configuration.config import Config
 from mesoslip.output import files
 from mesoslip.output.arrays import Stored
 from mesoslip.output.kinds import KINDS as OUTPUTS
 from mesoslip.output.writing import write, write_results
 from mesoslip.plots import lines
 from mesoslip.plots.extent import MAX_PARTS, Extent
+from mesoslip.plots.key_names import changes_in_a_line
 from mesoslip.plots.logarithmic import logarithmic
+from mesoslip.plots.printing import JOURNALS
 from mesoslip.plots.style import curve_style, styled
 from mesoslip.plots.sweep_panels import CHOICE_COLORS
 from mesoslip.plots.views import VIEWS, names_of_views
@@ -122,6 +125,7 @@ def test_the_gallery_has_every_view():
     }
 
 
+CONFIGURATIONS = ("configuration", "base_configuration")
 PART = {"x": "drive", "end": 0.09}
 NAMES_OF_RUNS = ["several", "layered", "quasistatic", "no slip", "me", "two samples"]
 
@@ -351,15 +355,27 @@ def test_units_suit_the_data(runs):
     )
 
 
-def test_the_caption_has_the_keys_that_a_run_changes(runs):
-    title = mesoslip.plot(runs["slow"]).axes[0].get_title("left")
-    assert "contacts.delay = 2 ms (was 500 µs)" in title
-    assert "count" not in title
-    elastic = mesoslip.plot(runs["layered"]).axes[0].get_title("left")
+def test_a_title_has_the_changes_if_they_fit_into_a_line(runs):
+    """In symbols and words; of a list, and of a run's length and record, there are none."""
+    title = mesoslip.plot(runs["slow"]).axes[0].get_title("left").splitlines()
+    assert title == [r"Costs \$5 or \$6", r"delay $\tau_d$ = 2 ms (was 500 µs)"]
     # Of another kind what is set, neither its defaults nor what is gone.
-    assert "slider.kind = layered (was rigid)" in elastic
-    assert "slider.layers = 4" in elastic
-    assert "damping" not in elastic
+    elastic = mesoslip.plot(runs["layered"]).axes[0].get_title("left").splitlines()[1]
+    assert elastic == "layered slider (was rigid), $N_l$ = 4"
+    config, base = (Config.from_toml(runs["me"].attrs[one]) for one in CONFIGURATIONS)
+    assert changes_in_a_line(config, base, 80) == r"$N\to\infty$ (was 200 contacts)"
+    stages = config.replace("drive.stage=[{duration=1, velocity=1e-7}, {duration=1, velocity=0}]")
+    assert "stage" not in changes_in_a_line(stages, base, 500)
+    # Where they do not fit, a title of its own is enough; without one, the first stand for all.
+    few = config.replace("slider.mass=1 g", "slider.damping_ratio=0.5")
+    assert changes_in_a_line(few, base, 50) == r"$N\to\infty$ (was 200 contacts), 2 more changes"
+    assert changes_in_a_line(few.replace("title=Own"), base, 50) == ""
+
+
+def test_engines_are_told_apart_in_words(runs):
+    figure = mesoslip.plot([runs["plain"], runs["me"]])
+    texts = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert texts == ["200 contacts", r"$N\to\infty$"]
 
 
 @pytest.mark.parametrize(
@@ -398,7 +414,7 @@ def test_a_realization_and_a_window_are_what_is_drawn(runs):
 def test_several_outputs_say_how_they_differ(runs):
     figure = mesoslip.plot([runs["plain"], runs["slow"]])
     texts = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert texts == ["contacts.delay = 500 µs", "contacts.delay = 2 ms"]
+    assert texts == [r"delay $\tau_d$ = 500 µs", r"delay $\tau_d$ = 2 ms"]
     first, second = figure.axes[0].lines
     for line, name in ((first, "plain"), (second, "slow")):
         parts = runs[name]["spring_force"], runs[name]["slip_traces/spring_force"]
@@ -477,6 +493,10 @@ def test_onsets_have_dimensions_or_the_reason_why_there_is_none(klein):
     least = melting["relative_force_drop"].values.min() * static * 1e6
     assert line.get_ydata().min() == pytest.approx(least)
     assert axes.get_xlabel().endswith("(ms)")
+    # Sequential breaking ends early, and is enlarged.
+    (inset,) = axes.child_axes
+    assert 0.5 < inset.lines[0].get_xdata()[-1] / inset.get_xlim()[1] < 1
+    assert 0.5 < inset.lines[0].get_ydata()[-1] / inset.get_ylim()[0] < 1
     none = mesoslip.plot(mesoslip.onset(klein(slider__stiffness=1e6)))
     assert "there is no onset" in none.axes[0].texts[0].get_text()
     # A curve and an onset have neither realizations nor times.
@@ -541,7 +561,33 @@ def test_curves_survive_print_in_grey():
 def test_nothing_collides_in_a_column_of_a_journal(runs, name):
     figure = mesoslip.plot(runs[name], width=0.086, font_size=8, letters=True)
     assert figure.get_figwidth() * 25.4 == pytest.approx(86)
+    assert figure.get_figheight() <= 1.5 * figure.get_figwidth() + 1e-9
     assert overlapping(figure) == []
+
+
+@pytest.mark.parametrize(("journal", "width", "size"), [("aps-1", 86, 8), ("nature-2", 183, 7)])
+def test_a_journal_has_its_width_and_font(runs, journal, width, size):
+    figure = mesoslip.plot(runs["no slip"], width=journal)
+    assert figure.get_figwidth() * 25.4 == pytest.approx(width)
+    assert figure.axes[0].xaxis.label.get_fontsize() == size
+    assert mesoslip.plot(runs["no slip"], width=journal, font_size=6).axes[0].title.get_size() == 6
+    with pytest.raises(mesoslip.ConfigError, match=r"width = 'prl': .* journal: aps-1, "):
+        mesoslip.plot(runs["no slip"], width="prl")
+
+
+def test_the_help_has_all_journals(command):
+    _, printed, _ = command("plot", "--help")
+    words = re.findall(r"[a-z]+-[0-9.]+[0-9]|[a-z]+-[0-9]", printed)
+    assert set(JOURNALS) <= set(words)
+
+
+def test_the_colours_of_a_lattice_are_those_of_its_loads(old):
+    """In tenths of the threshold: none of them is for loads that no contact has."""
+    drawn = mesoslip.plot(old, view="lattice").axes[0].collections[0]
+    loads = drawn.get_array().compressed()
+    assert drawn.norm.vmin == pytest.approx(loads.min(), abs=0.1)
+    assert drawn.norm.vmax == pytest.approx(loads.max(), abs=0.1)
+    assert drawn.norm.vmin <= loads.min() < loads.max() <= drawn.norm.vmax
 
 
 def test_a_legend_leaves_the_width_to_the_curves(runs):
@@ -607,7 +653,10 @@ def test_the_command_prints(runs, tmp_path, command):
     status, _, errors = command("plot", output, "-o", tmp_path / "a.png", "--format", "pdf")
     assert status == 2
     assert "--format" in errors
-    assert command("plot", output, "--width", "3 N")[0] == 2
+    assert command("plot", output, "--width", "elsevier-1", "-o", tmp_path / "b.svg")[0] == 0
+    status, _, errors = command("plot", output, "--width", "3 N")
+    assert status == 2
+    assert "aps-1, aps-2" in errors
 
 
 def test_a_slip_without_finer_samples_is_drawn_as_recorded(runs):

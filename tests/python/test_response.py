@@ -456,6 +456,17 @@ def test_forces_beyond_all_bounds_are_refused():
         mesoslip.response(tree)
 
 
+def test_the_picture_of_a_step_shows_its_peak_and_two_steady_forces(sliding):
+    """The law is below the record; two points determine no line."""
+    figure = mesoslip.plot(sliding, view="response")
+    data, law = figure.axes[0].lines[0], figure.axes[0].get_legend().get_lines()[0]
+    assert law.get_linewidth() > data.get_linewidth()
+    drawn = next(one for one in figure.axes[0].lines if "law" in str(one.get_label()))
+    assert drawn.get_zorder() < data.get_zorder()
+    assert "from two velocities" in figure.axes[1].get_title("left")
+    assert not [one for one in figure.axes[1].lines if one.get_linestyle() == "-"]
+
+
 def test_pictures(sliding):
     whole = mesoslip.plot(sliding, view="response")
     assert isinstance(whole, Figure)

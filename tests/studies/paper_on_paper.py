@@ -142,6 +142,7 @@ def draw(axes: np.ndarray, tree: xr.DataTree, suffix: str, name: str, shown: flo
             panel.hist(one, bins, weights=weights, histtype=style, color=color, label=kind,
                        alpha=0.5 if kind == "model" else 1)  # fmt: skip
         panel.set_xlabel(label, fontsize=8)
+        panel.set_ylabel("share of slips", fontsize=8)
     axes[0].sharey(axes[1])
     axes[0].set_ylabel("force over weight", fontsize=8)
 

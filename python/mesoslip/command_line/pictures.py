@@ -14,7 +14,6 @@ from mesoslip.array_packages import hidden
 from mesoslip.command_line.options import (
     OutputsArgument,
     output_option,
-    quantity_or_none,
     time_of,
 )
 from mesoslip.command_line.progress import progress_shown
@@ -96,11 +95,16 @@ def plot(
     width: Annotated[
         str | None,
         typer.Option(
-            help="Width in print, such as '8.6 cm', a column of many journals", metavar="LENGTH"
+            help="Width in print, such as '8.6 cm', or a column of a journal with its size of the "
+            "font: aps-1, aps-2, elsevier-1, elsevier-1.5, elsevier-2, nature-1, nature-2",
+            metavar="LENGTH",
         ),
     ] = None,
     font_size: Annotated[
-        float | None, typer.Option(help="Size of the font in points; by default 8", metavar="PT")
+        float | None,
+        typer.Option(
+            help="Size of the font in points; by default that of the journal, or 8", metavar="PT"
+        ),
     ] = None,
     title: Annotated[
         str | None,
@@ -125,6 +129,7 @@ def plot(
 
     import_matplotlib()
     from mesoslip.plots import plot as plots
+    from mesoslip.plots.printing import JOURNALS, width_of
 
     first = outputs[0]
     path = _path(figure, first, file_format)
@@ -143,7 +148,7 @@ def plot(
             x=None if x is None else x.value,
             start=-math.inf if start is None else time_of(start, "--from"),
             end=math.inf if end is None else time_of(end, "--to"),
-            width=quantity_or_none(width, "--width", "m", "8.6 cm", positive=True),
+            width=width if width is None or width in JOURNALS else width_of(width, "--width"),
             font_size=font_size,
             title=title,
             letters=letters,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 from mesoslip.configuration.config import Config
 from mesoslip.configuration.keys import key_kind
@@ -21,6 +21,12 @@ BOOKKEEPING = ("run.", "output.", "curve.")
 def is_bookkeeping(key: str) -> bool:
     """Whether a key affects the length of a run and its record, but not the motion."""
     return key.startswith(BOOKKEEPING) and key != "run.engine"
+
+
+class Setting(Protocol):
+    """Writes a key with its value in a configuration, the only one or one of several."""
+
+    def __call__(self, key: str, value: str, config: Config, /, *, is_alone: bool) -> str: ...
 
 
 class Difference(NamedTuple):
@@ -117,23 +123,28 @@ def _text_in_list(key: str, value: Any) -> str:
     return text_of(key, value)
 
 
-def changes(config: Config, base: Config) -> list[str]:
-    """Changes of a configuration relative to a base, a text for each key; bookkeeping comes last.
+def changes(config: Config, base: Config) -> list[Difference]:
+    """Changes of a configuration relative to a base: keys with the value and that before, which may
+    be `MISSING`; bookkeeping comes last.
 
     Keys that only the base has, and defaults that only the configuration has, are left out.
     """
     own = by_dotted_key(config.model_dump(exclude_none=True, exclude_defaults=True, by_alias=True))
-    texts: list[str] = []
-    last: list[str] = []
-    for key, (value, before) in differences([config, base]):
-        if value == MISSING or (before == MISSING and key not in own):
-            continue
-        text = f"{key} = {value}" + (f" (was {before})" if before != MISSING else "")
-        (last if is_bookkeeping(key) else texts).append(text)
-    return texts + last
+    found = [
+        one
+        for one in differences([config, base])
+        if one.values[0] != MISSING and (one.values[1] != MISSING or one.key in own)
+    ]
+    return sorted(found, key=lambda one: is_bookkeeping(one.key))
 
 
-def labels(configs: Sequence[Config], names: Sequence[str]) -> list[str]:
+def _plain_setting(key: str, value: str, _: Config, *, is_alone: bool) -> str:  # noqa: ARG001
+    return f"{key} = {value}"
+
+
+def labels(
+    configs: Sequence[Config], names: Sequence[str], setting: Setting = _plain_setting
+) -> list[str]:
     """A label for each configuration, from the keys in which it differs from the others.
 
     Keys of [run], [output] and [curve] count only if no others differ. Equal configurations are
@@ -142,9 +153,10 @@ def labels(configs: Sequence[Config], names: Sequence[str]) -> list[str]:
     all_found = differences(configs)
     found = [one for one in all_found if not is_bookkeeping(one.key)] or all_found
     texts = []
-    for index, name in enumerate(names):
+    for index, (config, name) in enumerate(zip(configs, names, strict=True)):
         given = [one for one in found if one.values[index] != MISSING] or found
-        parts = [f"{one.key} = {one.values[index]}" for one in given[:3]]
+        alone = len(given) == 1
+        parts = [setting(one.key, one.values[index], config, is_alone=alone) for one in given[:3]]
         parts += [f"and {len(given) - 3} more"] if len(given) > 3 else []
         texts.append(", ".join(parts) if parts else name)
     return [

@@ -13,6 +13,7 @@ from mesoslip.configuration import differences
 from mesoslip.errors import FileError
 from mesoslip.output.access import config_of, is_measured
 from mesoslip.output.kinds import KINDS, kind_of, kind_of_all
+from mesoslip.plots.key_names import plain, setting
 from mesoslip.plots.movie import Movie
 from mesoslip.plots.style import Canvas, legend_above, styled
 from mesoslip.plots.views import VIEWS, view_of
@@ -103,13 +104,13 @@ def _chosen(tree: xr.DataTree, name: str | None, options: Options) -> tuple[View
 
 def labels_of(trees: Sequence[xr.DataTree], names: Sequence[str]) -> list[str]:
     """A label for each output: how it differs from the others."""
-    short = [Path(name).stem if name.endswith(".nc") else name for name in names]
+    short = [plain(Path(name).stem if name.endswith(".nc") else name) for name in names]
     try:
         configs = [config_of(tree) for tree in trees]
     except FileError:
         # A measured trace may lack a configuration.
         return short
-    labels = differences.labels(configs, short)
+    labels = differences.labels(configs, short, setting)
     return [
         f"measured: {name}" if is_measured(tree) else label
         for tree, name, label in zip(trees, short, labels, strict=True)

@@ -52,6 +52,11 @@ def _draw_displacement(axes: Axes, tree: Tree, experiment: Experiment) -> None:
     force = axes.twinx()
     force.plot(x, experiment.force[0, ::step] / experiment.static_force, color=BLUE, linewidth=0.8)
     force.set_ylabel("force over $F_s$", color=BLUE)
+    force.tick_params(axis="y", colors=BLUE)
+    force.spines["right"].set(visible=True, color=BLUE)
+    # From no force on, so that the size of steps is seen.
+    low, high = min(0.0, force.get_ylim()[0]), max(0.0, force.get_ylim()[1])
+    force.set_ylim(1.1 * low, 1.1 * high)
     axes.set_xlabel(time.label("time"))
     axes.set_ylabel(length.label("displacement"))
     titles(axes, tree)

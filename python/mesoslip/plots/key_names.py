@@ -1,6 +1,11 @@
-"""Names and symbols of keys and measures in pictures."""
+"""Keys and measures in pictures: names, symbols, and values of keys as legends have them."""
 
 from __future__ import annotations
+
+import re
+
+from mesoslip.configuration.config import Config
+from mesoslip.configuration.differences import MISSING, changes, is_bookkeeping
 
 # Symbols of keys.
 SYMBOLS = {
@@ -55,6 +60,67 @@ NAMES = {
 }
 
 
+# Keys of words, with the word.
+WORDS = {
+    "contacts.coupling": "{} coupling",
+    "contacts.delay_law": "{} delays",
+    "contacts.initial": "{} contacts at the start",
+    "contacts.renewal": "thresholds: {}",
+    "contacts.threshold.law": "{} thresholds",
+    "contacts.ageing.law": "ageing: {}",
+    "contacts.track.correlation": "{} correlation",
+    "interaction.lattice": "{} lattice",
+    "slider.kind": "{} slider",
+    "slider.loading": "loading: {}",
+}
+
+
+def setting(key: str, value: str, config: Config, *, is_alone: bool) -> str:
+    """A key with its value, as legends and titles have it: with its symbol, or in words."""
+    if key == "run.engine":
+        is_infinite = value == "me"
+        return r"$N\to\infty$" if is_infinite else f"{config.contacts.count} contacts"
+    if key in WORDS:
+        return WORDS[key].format(plain(value))
+    return f"{name_of(key) if is_alone else symbol_or_name(key)} = {plain(value)}"
+
+
+def changes_in_a_line(config: Config, base: Config, room: int) -> str:
+    """The changes of a configuration from its base that fit into a number of characters.
+
+    Lists, and the length and the record of a run, are left out; and all, if they do not fit but the
+    configuration has a title of its own.
+    """
+    found = [
+        one
+        for one in changes(config, base)
+        if not is_bookkeeping(one.key) and not one.values[0].startswith("[")
+    ]
+    texts = []
+    for key, (value, before) in found:
+        text = setting(key, value, config, is_alone=len(found) == 1)
+        was = setting(key, before, base, is_alone=False) if key == "run.engine" else plain(before)
+        texts.append(text if before == MISSING else f"{text} (was {was})")
+    for count in range(len(texts), 0, -1):
+        rest = len(texts) - count
+        line = ", ".join([*texts[:count], *([f"{rest} more changes"] if rest else [])])
+        if shown_length(line) <= room:
+            return line
+        if config.title != base.title:
+            break
+    return ""
+
+
+def plain(text: str) -> str:
+    """A text on one line, with dollars as they are and not as formulas."""
+    return " ".join(text.split()).replace("$", r"\$")
+
+
+def shown_length(text: str) -> int:
+    """Approximate number of characters of a text with formulas."""
+    return len(re.sub(r"[${}_^]", "", re.sub(r"\\[a-zA-Z]+", "x", text)))
+
+
 def symbol_or_name(key: str) -> str:
     """The symbol of a key, or its last part."""
     return SYMBOLS.get(key, _plain(key))
@@ -69,4 +135,5 @@ def name_of(key: str) -> str:
 def _plain(key: str) -> str:
     if key.startswith("fit."):
         return key.removeprefix("fit.").replace(".", " ")
-    return key.rpartition(".")[2].replace("_", " ")
+    # The last part alone would be ambiguous: the time of ageing, the rate of breaking.
+    return " ".join(key.split(".")[1 if key.count(".") > 1 else -1 :]).replace("_", " ")

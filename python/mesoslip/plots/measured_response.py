@@ -69,7 +69,9 @@ def _draw_fit(axes: Axes, experiment: Experiment, found: Fit, scale: Scale) -> N
     else:
         parts += ["not determined"]
     label = fit_label(axes, parts)
-    axes.plot(_horizontal(experiment, found) / scale.size, force, color=RED, label=label)
+    axes.plot(
+        _horizontal(experiment, found) / scale.size, force, color=RED, linewidth=0.8, label=label
+    )
     axes.legend(loc="best")
 
 

@@ -9,7 +9,7 @@ from matplotlib.ticker import MaxNLocator, ScalarFormatter
 
 from mesoslip.configuration.units import from_cf_units
 from mesoslip.plots.key_names import symbol_or_name
-from mesoslip.plots.printing import UNLETTERED
+from mesoslip.plots.printing import UNLETTERED, is_narrow
 from mesoslip.plots.style import BLUE, Canvas
 from mesoslip.quantities import Scale, scale_for
 
@@ -57,7 +57,7 @@ def draw_pairs(figure: Canvas, place: object, tree: xr.DataTree) -> None:
             axes.tick_params(labelsize="x-small")
             for axis in (axes.xaxis, axes.yaxis):
                 axis.set_major_formatter(_formatter())
-                axis.set_major_locator(MaxNLocator(3, prune="both"))
+                axis.set_major_locator(MaxNLocator(2 if is_narrow(figure) else 3, prune="both"))
             if row == column:
                 axes.set_yticks([])
             if row == len(names) - 1:
@@ -73,5 +73,5 @@ def draw_pairs(figure: Canvas, place: object, tree: xr.DataTree) -> None:
 def _formatter() -> ScalarFormatter:
     """Labels of ticks with whole numbers, not differences from an offset."""
     formatter = ScalarFormatter(useOffset=False)
-    formatter.set_powerlimits((-4, 5))
+    formatter.set_powerlimits((-3, 5))
     return formatter

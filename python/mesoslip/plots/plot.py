@@ -22,13 +22,13 @@ from mesoslip.output.inputs import OutputLike, opened, several
 from mesoslip.plots.draw import draw, movie_of
 from mesoslip.plots.extent import Extent
 from mesoslip.plots.movie import ENDINGS, write
-from mesoslip.plots.printing import UNLETTERED, Print, current, printed
+from mesoslip.plots.printing import JOURNALS, UNLETTERED, Print, current, printed, width_of
 from mesoslip.plots.style import Canvas, filled, save, styled
 from mesoslip.plots.views import takes_arrays
 from mesoslip.plots.views.base import Options
 
 # Ticks of an axis that has no room for more.
-FEW_TICKS = 4
+FEW_TICKS = 3
 
 
 @arguments.checked(
@@ -87,10 +87,11 @@ def plot(
     ax
         Axes for the most informative panel, and for nothing else.
     width
-        Width of a new figure for print, such as "8.6 cm" (or 0.086, in meters) for a column of a
-        journal. In a narrow figure panels are below each other, not side by side.
+        Width of a new figure for print: a length such as "8.6 cm" (or 0.086, in meters), or a
+        column of a journal with its size of the font, such as "aps-1" (`JOURNALS`). In a narrow
+        figure panels are below each other, not side by side.
     font_size
-        Size of the font [pt]; 8 by default.
+        Size of the font [pt]; by default that of the journal, or 8.
     title
         Title of the picture instead of those of the outputs; "" for none.
     letters
@@ -123,6 +124,11 @@ def plot(
         x,
     )
     options = Options(extent, _whole("snapshot", snapshot))
+    if isinstance(width, str) and width in JOURNALS:
+        journal = JOURNALS[width]
+        width, font_size = journal.width, journal.font_size if font_size is None else font_size
+    elif isinstance(width, str):
+        width = width_of(width, "width")
     how = Print(
         None if width is None else _quantity("width", width, "m", "8.6 cm"),
         None if font_size is None else _number("font_size", font_size, "a number of points"),

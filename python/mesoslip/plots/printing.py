@@ -10,19 +10,42 @@ from contextvars import ContextVar
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import matplotlib as mpl
 from matplotlib.figure import Figure, SubFigure
 
+from mesoslip.configuration.units import to_si
 from mesoslip.errors import ConfigError, FileError, Problem
 
 INCH = 0.0254
+
+
+class Journal(NamedTuple):
+    """A column of a journal: its width [m] and the size of the font in figures [pt]."""
+
+    width: float
+    font_size: float
+
+
+# By the instructions to authors of the American Physical Society (capitals of at least 2 mm),
+# Elsevier (lettering of 7 pt) and Nature (5 to 7 pt).
+JOURNALS = {
+    "aps-1": Journal(0.086, 8.0),
+    "aps-2": Journal(0.178, 8.0),
+    "elsevier-1": Journal(0.090, 7.0),
+    "elsevier-1.5": Journal(0.140, 7.0),
+    "elsevier-2": Journal(0.190, 7.0),
+    "nature-1": Journal(0.089, 7.0),
+    "nature-2": Journal(0.183, 7.0),
+}
 # Widths and font sizes that can be read [m, pt].
 WIDTHS = (0.03, 2.0)
 FONT_SIZES = (3.0, 40.0)
 # Width below which panels stand in one column [inch].
 NARROW = 4.5
+# Maximum height of a narrow figure over its width, and height of any figure: a page of text [inch].
+MAX_ASPECT, MAX_HEIGHT = 1.5, 9.4
 # Dots per inch of print, of pictures of a given width.
 PRINT_DPI = 600
 
@@ -73,6 +96,15 @@ class Print:
         if self.font_size is not None:
             settings["font.size"] = self.font_size
         return settings | FONTS
+
+
+def width_of(text: str, key: str) -> float:
+    """A width of print [m] that is a length."""
+    try:
+        return to_si(text, "m", "8.6 cm")
+    except ValueError as error:
+        message = f"{error}, or the column of a journal: {', '.join(JOURNALS)}"
+        raise ConfigError([Problem("", key, message, text)]) from None
 
 
 DEFAULT = Print()
@@ -138,4 +170,6 @@ def size_of(size: tuple[float, float]) -> tuple[float, float]:
     width = current().width
     if width is None:
         return size
-    return width / INCH, size[1] * math.sqrt(width / INCH / size[0])
+    inches = width / INCH
+    limit = MAX_ASPECT * inches if inches < NARROW else MAX_HEIGHT
+    return inches, min(size[1] * math.sqrt(inches / size[0]), limit)

@@ -133,7 +133,7 @@ def _label_stages(axes: Axes, experiment: Experiment, x: Array, scale: Scale) ->
             label,
             (position / scale.size, 1.0),
             xycoords=("data", "axes fraction"),
-            fontsize="x-small",
+            fontsize="small",
             ha="center",
             va="bottom",
             color=color,

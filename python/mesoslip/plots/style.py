@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import textwrap
 import threading
 from collections.abc import Iterator
@@ -14,10 +13,10 @@ import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 
-from mesoslip.configuration import differences
 from mesoslip.configuration.config import Config
 from mesoslip.output.arrays import Tree
 from mesoslip.output.targets import written_whole
+from mesoslip.plots.key_names import changes_in_a_line, plain, shown_length
 from mesoslip.plots.printing import current, is_narrow, size_of
 
 # A whole figure, or a part of one.
@@ -32,32 +31,14 @@ CONTACT: dict[str, Any] = {"color": "black", "label": "contact force $F$"}
 OTHERS: dict[str, Any] = {"color": "0.75", "linewidth": 0.5, "zorder": 1}
 # Measured points with errors.
 POINTS: dict[str, Any] = {"fmt": "o", "color": "black", "markersize": 3}
+# A law fitted to a record, as a broad line below it that does not hide its peaks.
+FITTED: dict[str, Any] = {"color": RED, "linewidth": 2.4, "alpha": 0.6, "zorder": 1.5}
 # Characters in an inch of a line of the size 8.
 CHARACTERS_PER_INCH = 16
 # Width of the ticks and labels beside axes [inch].
 BESIDE_AXES = 0.6
 # Height of the ticks and labels below axes [inch].
 BELOW_AXES = 0.3
-# Maximum number of changed keys that a caption names.
-MAX_KEYS = 6
-
-
-def plain(text: str) -> str:
-    """A text on one line, with dollars as they are and not as formulas."""
-    return " ".join(text.split()).replace("$", r"\$")
-
-
-def caption(tree: Tree) -> str:
-    """The changes of a run from its base."""
-    base = tree.attrs.get("base_configuration")
-    if base is None:
-        return ""
-    changes = differences.changes(
-        Config.from_toml(tree.attrs["configuration"]), Config.from_toml(base)
-    )
-    if len(changes) > MAX_KEYS:
-        changes = [*changes[:MAX_KEYS], f"and {len(changes) - MAX_KEYS} more keys"]
-    return ", ".join(changes)
 
 
 def titles(
@@ -68,14 +49,15 @@ def titles(
     mathematical: str = "",
     beside_legend: bool = False,
 ) -> None:
-    """Write the title of an output over axes, and below it its changes from its base.
+    """Write the title of an output over axes, and below it its changes from its base in a line.
 
     A line about what is shown may follow, and a last one with formulas. `beside_legend` leaves room
     for a legend between title and axes.
     """
     width = axes_width(axes)
-    texts = [*headings(tree), about]
-    lines = [filled(text, width, max_lines=2) for text in texts if text]
+    title, changes = headings(tree, characters(width))
+    lines = [wrapped(title, width, max_lines=2), changes, wrapped(about, width, max_lines=2)]
+    lines = [one for one in lines if one]
     lines += [mathematical] if mathematical else []
     lines += [""] * legend_rows(axes) if beside_legend else []
     axes.set_title("\n".join(lines), loc="left")
@@ -86,14 +68,19 @@ def write_title(axes: Axes, text: str) -> None:
     axes.set_title(wrapped(text, axes_width(axes)), loc="left")
 
 
-def headings(tree: Tree) -> list[str]:
-    """The title of an output and its changes from its base; empty if the picture has a title."""
+def headings(tree: Tree, room: int) -> tuple[str, str]:
+    """The title of an output and its changes from its base, as far as they fit into a number of
+    characters; empty if the picture has a title."""
     if current().title is not None:
-        return []
+        return "", ""
     title = tree.attrs.get("title", "")
     if tree.attrs.get("complete") == "false":
         title = f"{title} ({tree.attrs['comment']})"
-    return [title, caption(tree)]
+    base = tree.attrs.get("base_configuration")
+    if base is None:
+        return plain(title), ""
+    config = Config.from_toml(tree.attrs["configuration"])
+    return plain(title), changes_in_a_line(config, Config.from_toml(base), room)
 
 
 def filled(text: str, width: float, max_lines: int | None = None) -> str:
@@ -148,9 +135,9 @@ def legend_above(axes: Axes, columns: int = 3, title: str | None = None) -> None
 
 def _legend_columns(axes: Axes, columns: int = 3) -> int:
     """Number of columns of a legend that fit above axes."""
-    # Formulas are shorter than their source; a line and its distance take five characters.
+    # A line and its distance take five characters.
     labels = axes.get_legend_handles_labels()[1]
-    lengths = [len(re.sub(r"\\[a-z]+|[${}_^]", "", one)) + 5 for one in labels]
+    lengths = [shown_length(one) + 5 for one in labels]
     room = 1.15 * characters(axes_width(axes))
     for count in range(min(columns, len(labels)), 1, -1):
         rows = -(-len(labels) // count)
@@ -169,7 +156,8 @@ def legend_rows(axes: Axes) -> int:
 def shared_legend(figure: Canvas, axes: Axes) -> None:
     """Put the legend of axes below a figure, a line for each entry."""
     handles, labels = axes.get_legend_handles_labels()
-    labels = [filled(label, 1.05 * figure.bbox.width / figure.figure.dpi - 0.3) for label in labels]
+    width = 1.05 * figure.bbox.width / figure.figure.dpi - 0.3
+    labels = [wrapped(label, width) for label in labels]
     figure.legend(handles, labels, loc="outside lower left", ncols=1)
 
 

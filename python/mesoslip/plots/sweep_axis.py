@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from mesoslip.configuration.units import from_cf_units
-from mesoslip.plots.key_names import name_of
+from mesoslip.plots.key_names import name_of, symbol_or_name
 from mesoslip.plots.logarithmic import logarithmic
 from mesoslip.plots.style import BLUE, RED, axes_height, axes_width, characters, wrapped
 from mesoslip.quantities import Scale, number, scale_for
@@ -48,18 +48,21 @@ class SweptKey:
     values: Array
     words: tuple[str, ...]
     is_logarithmic: bool
+    symbol: str
+    """The symbol with its unit, where there is no room for the label."""
 
     @classmethod
     def of(cls, coordinate: xr.DataArray) -> SweptKey:
         """The axis of a coordinate of a sweep."""
-        values = coordinate.values
+        values, name = coordinate.values, str(coordinate.name)
         if values.dtype.kind not in "fiu":
             positions = np.arange(len(values), dtype=np.float64)
-            return cls(name_of(str(coordinate.name)), positions, tuple(map(str, values)), False)
+            words = tuple(map(str, values))
+            return cls(name_of(name), positions, words, False, symbol_or_name(name))
         scale = scale_of(coordinate)
         is_wide = np.min(values) > 0 and np.max(values) > LOGARITHMIC_RANGE * np.min(values)
-        label = scale.label(name_of(str(coordinate.name)))
-        return cls(label, values / scale.size, (), bool(is_wide))
+        label, symbol = (scale.label(one) for one in (name_of(name), symbol_or_name(name)))
+        return cls(label, values / scale.size, (), bool(is_wide), symbol)
 
     @property
     def order(self) -> NDArray[np.intp]:
@@ -90,8 +93,8 @@ class SweptKey:
 
     def apply(self, axes: Axes, which: str) -> None:
         """Label an axis ("x" or "y") of a panel."""
-        room = axes_width(axes) if which == "x" else axes_height(axes)
-        getattr(axes, f"set_{which}label")(wrapped(self.label, room))
+        label = wrapped(self.label, axes_width(axes) if which == "x" else axes_height(axes))
+        getattr(axes, f"set_{which}label")(label if label.count("\n") < 2 else self.symbol)
         if self.is_logarithmic:
             logarithmic(axes, which)
         if self.words:

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from mesoslip.analysis import avalanches as avalanche_catalogue
 from mesoslip.analysis.avalanche_sizes import fit_power_law
 from mesoslip.plots.snapshots import chosen_snapshot
+from mesoslip.plots.style import BLUE, RED, YELLOW
 from mesoslip.plots.views.avalanches import draw_distribution
 from mesoslip.plots.views.lattice import draw_contacts
 from mesoslip.quantities import with_error
@@ -47,7 +48,7 @@ def avalanche_sizes(trees: Sequence[xr.DataTree]) -> Figure:
     *sliders, bundle = trees
     figure = Figure(figsize=(6.5, 3.2))
     stationary, failing = figure.subplots(1, 2)
-    for tree, color in zip(sliders, ("tab:green", "tab:orange", "tab:red"), strict=True):
+    for tree, color in zip(sliders, (YELLOW, RED, BLUE), strict=True):
         config = configuration(tree)
         sizes = avalanche_catalogue.avalanches(tree)["size"].values
         fit = fit_power_law(sizes, min_size=10)
@@ -60,7 +61,7 @@ def avalanche_sizes(trees: Sequence[xr.DataTree]) -> Figure:
         draw_distribution(stationary, sizes, fit, color=color, label=label)
     for tree, min_ratio, color, exponent in (
         (bundle, None, "black", 2.5),
-        (bundle, 0.999, "tab:blue", 1.5),
+        (bundle, 0.999, BLUE, 1.5),
     ):
         bursts = avalanche_catalogue.avalanches(tree, min_force_ratio=min_ratio)
         sizes = bursts["size"].values[~avalanche_catalogue.failures(tree, bursts)]

@@ -9,7 +9,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 from mesoslip.output.access import group_of
 from mesoslip.plots.close_up import largest_slip, slip_window
-from mesoslip.plots.style import CONTACT, SPRING
+from mesoslip.plots.style import CONTACT, RED, SPRING
 from outputs import configuration
 
 from figures.base import source_figure
@@ -109,7 +109,7 @@ def layers(trees: Sequence[xr.DataTree]) -> Figure:
         inset = axes.inset_axes((0.45, 0.62, 0.53, 0.36))
         for tree, style in zip(trees, ("--", "-"), strict=True):
             count = configuration(tree).slider.layer_count
-            color = "tab:red" if style == "--" else "black"
+            color = RED if style == "--" else "black"
             line: dict[str, Any] = {"color": color, "linestyle": style}
             slips = group_of(tree, "slips")
             if slips.sizes["slip"]:

@@ -9,6 +9,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from mesoslip.output.samples import series
+from mesoslip.plots.style import RED, YELLOW
 from mesoslip.plots.views.onset import EQUATIONS
 from outputs import configuration
 
@@ -56,8 +57,8 @@ def onset_of_slip(trees: Sequence[xr.DataTree]) -> Figure:
         static = configuration(onset).contacts.static_force
         for axes in columns:
             for tree, style in (
-                (contacts, {"color": "tab:orange", "label": "N contacts"}),
-                (infinite, {"color": "tab:red", "label": r"$N \to \infty$"}),
+                (contacts, {"color": YELLOW, "label": "N contacts"}),
+                (infinite, {"color": RED, "label": r"$N \to \infty$"}),
             ):
                 times, force = series(tree, "spring_force")
                 _, displacement = series(tree, "displacement")
@@ -128,7 +129,7 @@ def limit_of_many_contacts(trees: Sequence[xr.DataTree]) -> Figure:
     force.legend()
     difference.loglog(counts, errors, "o", color="black", markersize=4)
     slope = errors[-1] * np.sqrt(counts[-1] / np.array(counts))
-    difference.loglog(counts, slope, color="tab:red", linestyle="--", label="$N^{-1/2}$")
+    difference.loglog(counts, slope, color=RED, linestyle="--", label="$N^{-1/2}$")
     difference.set_xlabel("$N$")
     difference.set_ylabel("rms difference over $F_s$")
     difference.legend()

@@ -13,7 +13,15 @@ from mesoslip.analysis.avalanche_sizes import PowerLawFit, ccdf, fit_power_law, 
 from mesoslip.analysis.avalanches import NO_AVALANCHES, failures
 from mesoslip.errors import FileError
 from mesoslip.output.access import group_of
-from mesoslip.plots.style import RED, Canvas, curve_color, shared_legend, side_by_side, titles
+from mesoslip.plots.style import (
+    POINTS,
+    RED,
+    Canvas,
+    curve_color,
+    shared_legend,
+    side_by_side,
+    titles,
+)
 from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import percent, with_error
 
@@ -22,6 +30,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+# Probability beyond either end of an interval of one standard deviation.
+TAIL = 0.1587
 # Cutoffs of the fitted laws in formulas, by the exponent of s/s_c.
 CUTOFFS = {1.0: "e^{-s/s_c}", 2.0: "e^{-(s/s_c)^2}"}
 
@@ -31,9 +41,9 @@ def draw(tree: xr.DataTree, options: Options, figure: Canvas | None) -> Canvas:
     sizes = scaling_sizes(tree)
     figure, (density, cumulative) = side_by_side(figure, (6.5, 3))
     draw_density(density, tree, options)
+    titles(density, tree)
     cumulative.loglog(*ccdf(sizes), color="black", drawstyle="steps-pre")
     _label_cumulative(cumulative)
-    titles(cumulative, tree)
     return figure
 
 
@@ -41,11 +51,11 @@ def draw_density(axes: Axes, tree: xr.DataTree, _: Options) -> None:
     """Draw the density of the sizes of avalanches, and the power law fitted to them."""
     sizes = scaling_sizes(tree)
     fit = fit_power_law(sizes)
-    draw_distribution(axes, sizes, fit)
+    law = "" if fit is None else _describe(fit, fit.count / sizes.size)
+    draw_distribution(axes, sizes, fit, law)
     _label_density(axes)
-    if fit is not None:
-        color = RED if fit.is_rejected else "black"
-        axes.set_title(_describe(fit, fit.count / sizes.size), loc="left", color=color)
+    if law:
+        axes.legend(loc="lower left")
 
 
 def _describe(fit: PowerLawFit, part: float) -> str:
@@ -55,9 +65,9 @@ def _describe(fit: PowerLawFit, part: float) -> str:
     lines = [rf"$s^{{-\tau}}{cutoff}$, $\tau$ = {exponent}"]
     if fit.cutoff_is_resolved:
         lines.append(f"$s_c$ = {with_error(fit.cutoff, fit.cutoff_error)}")
-    lines.append(f"fitted to $s$ ≥ {fit.min_size}, {percent(part)} of the sizes")
+    lines.append(f"$s$ ≥ {fit.min_size}, {percent(part)} of the sizes")
     if fit.is_rejected:
-        lines.append(f"rejected: sizes do not follow this law (p = {fit.p_value:.2g})")
+        lines.append(f"rejected: sizes do not\nfollow this law (p = {fit.p_value:.2g})")
     return "\n".join(lines)
 
 
@@ -99,19 +109,34 @@ def scaling_sizes(tree: xr.DataTree) -> Array:
 
 
 def draw_distribution(
-    axes: Axes, sizes: Array, fit: PowerLawFit | None = None, **style: Any
+    axes: Axes, sizes: Array, fit: PowerLawFit | None = None, law: str = "", **style: Any
 ) -> None:
-    """Draw the density of avalanche sizes in logarithmic bins, and the power law fitted to them."""
+    """Draw the density of avalanche sizes in logarithmic bins with intervals of 68 %.
+
+    The power law fitted to them is a line over its range, in the same colour if it has no label.
+    """
     bins = logarithmic_bins(sizes)
-    style = {"color": "black", "markersize": 2.5} | style
-    (points,) = axes.loglog(bins.centre, bins.density, "o", **style)
+    style = POINTS | {"markersize": 2.5, "elinewidth": 0.7} | style
+    ends = counting_interval(bins.count) * bins.density / bins.count
+    errors = np.abs(ends - bins.density)
+    axes.errorbar(bins.centre, bins.density, errors, **style)
+    axes.set(xscale="log", yscale="log")
     if fit is None:
         return
     fitted = bins.centre >= fit.min_size
     centre, width = bins.centre[fitted], np.diff(bins.edges[fitted], axis=1)[:, 0]
     density = fit.forms[0].relative_probability(centre)
     density *= np.sum(bins.density[fitted] * width) / np.sum(density * width)
-    axes.loglog(centre, density, color=points.get_color(), linewidth=0.7, alpha=0.7)
+    color = RED if law else style["color"]
+    axes.plot(centre, density, "-", color=color, linewidth=0.9, label=law or None, zorder=3)
+
+
+def counting_interval(count: NDArray[np.int64]) -> Array:
+    """Ends of the interval of 68 % of the expectation of counts by Garwood, shape (2, bins)."""
+    from scipy.stats import chi2
+
+    low, high = chi2.ppf(TAIL, 2 * count) / 2, chi2.isf(TAIL, 2 * count + 2) / 2
+    return np.stack([low, high])
 
 
 def _label_density(axes: Axes) -> None:

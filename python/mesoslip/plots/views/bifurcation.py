@@ -14,6 +14,8 @@ from mesoslip.configuration.config import Config
 from mesoslip.configuration.differences import flat, is_bookkeeping
 from mesoslip.configuration.keys import key_kind
 from mesoslip.errors import ConfigError, Problem
+from mesoslip.plots.key_names import name_of
+from mesoslip.plots.logarithmic import logarithmic
 from mesoslip.plots.style import BLUE
 from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import scale_for
@@ -48,8 +50,8 @@ def draw_peaks(
             np.full(one.size, value / across.size), one / up.size, ".", color=BLUE, markersize=2
         )
     if values.min() > 0 and values.max() > MIN_LOG_RATIO * values.min():
-        axes.set_xscale("log")
-    axes.set_xlabel(across.label(key))
+        logarithmic(axes, "x")
+    axes.set_xlabel(across.label(name_of(key)))
     axes.set_ylabel(up.label("force at the starts of slips"))
 
 

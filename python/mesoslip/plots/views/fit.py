@@ -7,13 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from mesoslip.output.access import trace_suffixes
+from mesoslip.plots.key_names import plain
 from mesoslip.plots.lines import max_size
 from mesoslip.plots.parameter_pairs import draw_pairs
 from mesoslip.plots.printing import current, is_narrow
-from mesoslip.plots.style import BLUE, Canvas, canvas, legend_above, plain
+from mesoslip.plots.style import BLUE, Canvas, canvas, legend_above
 from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import scale_for
 
@@ -33,19 +35,17 @@ def draw(tree: xr.DataTree, _: Options, figure: Canvas | None) -> Canvas:
     names = list(tree["posterior"].data_vars)
     size, traces = max(2, len(names)), trace_suffixes(tree)
     is_stacked = is_narrow(figure)
-    heights = [1.25 * size, *(4.5 if is_stacked else 2.6 for _ in traces)]
+    heights = [(0.8 if is_stacked else 1.25) * size, *(2.6 for _ in traces)]
     figure = canvas(figure, (3.4 if is_stacked else 7.0, sum(heights)))
-    rows, columns = (4, 1) if is_stacked else (2, 3)
     whole = figure.add_gridspec(1 + len(traces), 1, height_ratios=heights)
     draw_pairs(figure, whole[0], tree)
     for number, after in enumerate(traces, 1):
-        below = whole[number].subgridspec(rows, columns, height_ratios=[1.2] + [1] * (rows - 1))
+        below = whole[number].subgridspec(2, 3, height_ratios=[1.1, 1])
         axes = figure.add_subplot(below[0, :])
         _draw_one(axes, tree, after)
         if len(traces) > 1:
             axes.set_title(plain(tree[f"observed_data{after}"].attrs["title"]), loc="left")
-        places = [below[place] for place in np.ndindex(rows, columns) if place[0]]
-        _slips(figure, places, tree, after)
+        _slips(figure, [below[1, column] for column in range(3)], tree, after)
     if current().title is None:
         figure.suptitle(plain(tree.attrs.get("title", "")), x=0.01, ha="left")
     return figure
@@ -104,10 +104,14 @@ def _slips(figure: Canvas, places: Sequence[Any], tree: xr.DataTree, after: str)
                         weights=np.full(values.size, 1 / values.size),
                         **style,
                     )
-        axes.set_yticks([])
-        axes.set_xlabel(scale.label(quantity))
+        label = scale.label(quantity)
+        axes.set_xlabel(label.replace(" (", "\n(") if is_narrow(figure) else label)
+        if column == 0:
+            axes.set_ylabel("share of slips")
+        if is_narrow(figure):
+            axes.xaxis.set_major_locator(MaxNLocator(2))
         if column == 0 and both.size and is_narrow(figure):
-            legend_above(axes, columns=2)
+            legend_above(axes, columns=1)
         elif column == 0 and both.size:
             axes.set_ylim(0, 1.5 * axes.get_ylim()[1])
             axes.legend(loc="upper left", ncols=2)

@@ -10,9 +10,10 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from mesoslip.output.access import trace_suffixes
+from mesoslip.plots.key_names import plain
 from mesoslip.plots.lines import max_size
 from mesoslip.plots.printing import is_narrow
-from mesoslip.plots.style import BLUE, RED, Canvas, canvas, legend_above, plain
+from mesoslip.plots.style import BLUE, RED, Canvas, canvas, legend_above
 from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import scale_for
 
@@ -35,7 +36,7 @@ def draw(tree: xr.DataTree, _: Options, figure: Canvas | None) -> Canvas:
     """Excerpts of measured and predicted traces, the shapes of slips, and the worst summaries."""
     suffixes = trace_suffixes(tree)
     is_stacked = is_narrow(figure)
-    heights = [*(4.0 if is_stacked else 1.9 for _ in suffixes), 3.4 if is_stacked else 3.0]
+    heights = [*(3.0 if is_stacked else 1.9 for _ in suffixes), 1.8 if is_stacked else 3.0]
     figure = canvas(figure, (3.4 if is_stacked else 7.0, 0.6 + sum(heights)))
     rows = figure.add_gridspec(len(heights), 1, height_ratios=heights)
     for number, after in enumerate(suffixes):
@@ -142,7 +143,7 @@ def draw_scores(axes: Axes, tree: xr.DataTree, _: Options) -> None:
         listed = {(labels[one], int(data["trace"].values[one])) for one in chosen}
         if name not in listed and size[index] != 0:
             chosen.append(int(index))
-        if len(chosen) == LISTED:
+        if len(chosen) == (LISTED // 2 if is_narrow(axes.figure) else LISTED):
             break
     bad = set(str(tree.attrs["disagreeing"]).split("\n"))
     several = len(trace_suffixes(tree)) > 1

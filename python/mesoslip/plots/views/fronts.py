@@ -24,8 +24,8 @@ from mesoslip.quantities import number, scale_for
 
 Array = NDArray[np.float64]
 
-# Time around the fronts of the event that is drawn, over their duration.
-MARGIN = 0.6
+# Time before and after the fronts of the event that is drawn, over their duration.
+BEFORE, AFTER = 0.08, 0.6
 # Samples in a window from which the record of the blocks is drawn below the ruptures, and the
 # maximum number that is.
 MIN_SAMPLES, MAX_SAMPLES = 30, 1500
@@ -61,8 +61,8 @@ def picture_of(tree: Tree, options: Options) -> Picture:
         # Of several whole events the first.
         largest = int(np.argmax(found.events["block_count"]))
         low, high = (float(found.events[one][largest]) for one in ("start_time", "end_time"))
-        margin = MARGIN * max(high - low, 1e-6 * (window[1] - window[0]))
-        window = max(window[0], low - margin), min(window[1], high + margin)
+        size = max(high - low, 1e-6 * (window[1] - window[0]))
+        window = max(window[0], low - BEFORE * size), min(window[1], high + AFTER * size)
     slider = config_of(tree).slider
     spacing = slider.block_spacing
     return Picture(found, ruptures, window, realization, spacing, spacing * slider.block_count)

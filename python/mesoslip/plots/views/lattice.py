@@ -39,6 +39,8 @@ MAX_POLYGONS = 20_000
 LATTICE_WIDTH = 2.6
 # Width of the colours beside a lattice, and height of the title over it [inch].
 BESIDE_LATTICE, OVER_LATTICE = 1.0, 0.45
+# Width of a narrow figure, and height of the colours and the title there [inch].
+NARROW, BELOW_LATTICE = 3.4, 0.75
 # Height of the axes of the time below a lattice, with their labels [inch].
 TIME_HEIGHT = 1.0
 # Colour of missing values.
@@ -51,10 +53,12 @@ def draw(tree: xr.DataTree, options: Options, figure: Canvas | None) -> Canvas:
     size = snapshot["avalanche_size"].item()
     count = 2 if size else 1
     width, height = _lattice_size(snapshot)
-    rows, columns = (count, 1) if is_narrow(figure) else (1, count)
-    whole = columns * (width + BESIDE_LATTICE), rows * (height + OVER_LATTICE)
-    figure = canvas(figure, whole)
-    panels = figure.subplots(rows, columns, squeeze=False).ravel()
+    inches = count * (width + BESIDE_LATTICE), height + OVER_LATTICE
+    if count > 1 and is_narrow(figure):
+        # Colours are below the lattices, which share the width.
+        inches = NARROW, NARROW / count * height / width + BELOW_LATTICE
+    figure = canvas(figure, inches)
+    panels = figure.subplots(1, count, squeeze=False).ravel()
     _draw_load(panels[0], snapshot)
     if size:
         _draw_generations(panels[1], snapshot)
@@ -122,15 +126,26 @@ def _lattice_size(snapshots: xr.Dataset) -> tuple[float, float]:
 
 
 def _load_range(load: Array) -> Normalize:
-    """Limits of the colours of loads: from 0, or their negative minimum, to the threshold."""
-    return Normalize(min(0.0, math.floor(10 * np.nanmin(load, initial=0.0)) / 10), 1.0)
+    """Limits of the colours of loads: tenths of the threshold around those that occur."""
+    known = load[np.isfinite(load)]
+    low, high = (known.min(), known.max()) if known.size else (0.0, 1.0)
+    low, high = math.floor(10 * low) / 10, math.ceil(10 * high) / 10
+    return Normalize(low, high if high > low else low + 0.1)
+
+
+def _add_colors(axes: Axes, drawn: Any, label: str) -> None:
+    """A colour bar beside a lattice, or below it where two of them share a narrow figure."""
+    place = axes.get_subplotspec()
+    is_shared = place is not None and place.get_gridspec().ncols > 1
+    location = "bottom" if is_shared and is_narrow(axes.figure) else "right"
+    axes.figure.colorbar(drawn, ax=axes, label=label, location=location)
 
 
 def _draw_load(axes: Axes, snapshot: xr.Dataset) -> None:
     """Draw the force over threshold of the contacts of a snapshot."""
     load = snapshot["load"].values
     drawn = draw_contacts(axes, snapshot, load, cmap="viridis", norm=_load_range(load))
-    axes.figure.colorbar(drawn, ax=axes, label="force over threshold")
+    _add_colors(axes, drawn, "force over threshold")
     time = with_unit(snapshot["snapshot_time"].item(), "s", 6)
     axes.set_title(f"snapshot at {time}\ngrey: detached", loc="left")
 
@@ -141,7 +156,7 @@ def _draw_generations(axes: Axes, snapshot: xr.Dataset) -> None:
     generation[generation == 0] = np.nan
     norm = Normalize(1, np.nanmax(generation))
     drawn = draw_contacts(axes, snapshot, generation, cmap="inferno_r", norm=norm)
-    axes.figure.colorbar(drawn, ax=axes, label="generation")
+    _add_colors(axes, drawn, "generation")
 
 
 def _spreading(snapshot: xr.Dataset) -> Movie:

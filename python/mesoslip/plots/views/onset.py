@@ -27,6 +27,9 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+# Share of the range of forces from which sequential breaking is visible; range of an inset for it
+# over its own.
+VISIBLE, ENLARGED = 0.1, 1.5
 # Styles of the equations for the onset of slip, as in the source.
 EQUATIONS: dict[str, dict[str, Any]] = {
     "sequential": {"color": "black", "label": "sequential breaking (S46)"},
@@ -41,6 +44,7 @@ def draw(tree: xr.DataTree, options: Options, figure: Canvas | None) -> Canvas:
     draw_drop(linear, tree, options)
     if not solutions:
         return figure
+    _enlarge_start(linear, solutions)
     (logarithmic,) = others
     time = scale_for(max(one.times[-1] for one in solutions), "s")
     force = scale_for(max(np.abs(one.drop).max() for one in solutions), "N")
@@ -54,6 +58,23 @@ def draw(tree: xr.DataTree, options: Options, figure: Canvas | None) -> Canvas:
     logarithmic.set_ylabel(force.label(r"$-\Delta F_d$"))
     logarithmic.set_title("dotted: short-time asymptotes", loc="left")
     return figure
+
+
+def _enlarge_start(axes: Axes, solutions: Sequence[_Solution]) -> None:
+    """Draw the start of slip in an inset, where sequential breaking ends so early that it is not
+    visible beside instant melting."""
+    early = [one for one in solutions if one.equation == "sequential"]
+    if not early or np.ptp(early[0].drop) > VISIBLE * max(np.ptp(one.drop) for one in solutions):
+        return
+    end, depth = ENLARGED * early[0].times[-1], ENLARGED * np.ptp(early[0].drop)
+    time, force = scale_for(end, "s"), scale_for(depth, "N")
+    inset = axes.inset_axes((0.56, 0.6, 0.42, 0.3))
+    for one in solutions:
+        style = EQUATIONS[one.equation] | {"label": None}
+        inset.plot(one.times / time.size, one.drop / force.size, **style)
+    inset.set(xlim=(0, end / time.size), ylim=(-depth / force.size, 0.1 * depth / force.size))
+    inset.tick_params(labelsize="small")
+    inset.set_title(f"start, {force.name} over {time.name}", fontsize="small", loc="left", pad=2)
 
 
 def draw_drop(axes: Axes, tree: xr.DataTree, options: Options) -> None:

@@ -9,9 +9,10 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from mesoslip.analysis.apparatus import FORCES
+from mesoslip.plots.key_names import plain
 from mesoslip.plots.parameter_pairs import draw_pairs
 from mesoslip.plots.printing import current, is_narrow
-from mesoslip.plots.style import BLUE, Canvas, canvas, plain
+from mesoslip.plots.style import BLUE, Canvas, canvas
 from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import Scale, scale_for
 

@@ -18,7 +18,7 @@ from mesoslip.plots.logarithmic import logarithmic
 from mesoslip.plots.measured_response import draw_measured, draw_measured_record
 from mesoslip.plots.printing import is_narrow
 from mesoslip.plots.response_record import draw_record, fit_label, title_record
-from mesoslip.plots.style import POINTS, RED, Canvas, canvas, write_title
+from mesoslip.plots.style import FITTED, POINTS, RED, Canvas, canvas, write_title
 from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import Scale, percent, scale_for, with_error, with_unit
 
@@ -41,7 +41,7 @@ def _draw_fit(axes: Axes, experiment: Experiment, found: Fit, scale: Scale) -> N
     misfit = found.relative_misfit
     parts += [f"misfit {percent(misfit)}"] if misfit > MAX_MISFIT else []
     label = fit_label(axes, parts)
-    axes.plot(drive / scale.size, force, color=RED, label=label)
+    axes.plot(drive / scale.size, force, **FITTED, label=label)
     axes.legend(loc="best")
 
 
@@ -84,7 +84,10 @@ def draw_steady(axes: Axes, data: Arrays) -> None:
         ends = np.array([x.min(), x.max()])
         values = (found.level + found.slope * (ends + math.log(reference))) * scale
         slope = with_error(found.slope * scale, found.slope_error * scale)
-        axes.plot(ends, values, color=RED)
+        if np.unique(velocity).size > 2:
+            axes.plot(ends, values, color=RED)
+        else:
+            slope += ", from two velocities"
         write_title(axes, f"$a - b$ = {slope}")
     axes.set_xlabel(f"$\\ln(V/V_0)$, $V_0$ = {with_unit(reference, 'm/s', 3)}")
     axes.set_ylabel("steady force over $F_s$")

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import Any
 
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
 
 from mesoslip.output.access import config_of, is_measured
 from mesoslip.output.arrays import Tree
@@ -41,43 +40,43 @@ def draw(tree: Tree, options: Options, figure: Canvas | None) -> Canvas:
     below = _known_below([tree])
     is_stacked = slip is not None and is_narrow(figure)
     size = (6.5 if slip is None else 8.0, _height(below))
-    figure = canvas(figure, (3.4, 2.6 + 2.1 * len(below)) if is_stacked else size)
-    panels = _panels(figure, 1 + len(below), slip is not None, is_stacked)
-    _draw_force(panels[0, 0], tree, extent, horizontal)
-    for axes, name in zip(panels[1:, 0], below, strict=True):
+    figure = canvas(figure, (3.4, 2.9 + 0.9 * len(below)) if is_stacked else size)
+    whole, near = _panels(figure, 1 + len(below), slip is not None, is_stacked)
+    _draw_force(whole[0], tree, extent, horizontal)
+    for axes, name in zip(whole[1:], below, strict=False):
         _draw_variable(axes, tree, name, extent, horizontal)
     if slip is not None:
         is_shaded = extent.horizontal[0] == "time"
         place = "above" if is_stacked else "at left"
         title = f"largest slip (shaded {place})" if is_shaded else "largest slip"
-        draw_slip(list(panels[:, 1]), tree, slip, below, extent, title)
+        draw_slip(near, tree, slip, below, extent, title)
         if is_shaded:
             edges = [slip[name] / horizontal.scale.size for name in ("start_time", "end_time")]
-            for axes in panels[:, 0]:
+            for axes in whole:
                 axes.axvspan(*edges, color=YELLOW, alpha=0.4, linewidth=0.8, zorder=0)
-    for axes in panels[:-1].flat:
+    for axes in (*whole[:-1], *near[:-1]):
         axes.set_xlabel("")
-    figure.align_ylabels(panels)
+    figure.align_ylabels([*whole, *near] if is_stacked else None)
     return figure
 
 
-def _panels(figure: Canvas, rows: int, has_slip: bool, is_stacked: bool) -> NDArray[Any]:
-    """Panels of the run, and of its slip beside or below them; shape (rows, 1 or 2)."""
+def _panels(
+    figure: Canvas, rows: int, has_slip: bool, is_stacked: bool
+) -> tuple[list[Axes], list[Axes]]:
+    """Panels of the run, and those of its slip beside them, or below the force of the run."""
     ratios = [1.7, *(1 for _ in range(rows - 1))]
     if not is_stacked:
         columns = 2 if has_slip else 1
         widths = [2.1, 1][:columns]
-        panels: NDArray[Any] = figure.subplots(
+        panels = figure.subplots(
             rows, columns, sharex="col", squeeze=False, height_ratios=ratios, width_ratios=widths
         )
-        return panels
-    stacked = figure.subplots(2 * rows, 1, height_ratios=2 * ratios)
-    for first in (0, rows):
-        for axes in stacked[first : first + rows - 1]:
-            axes.sharex(stacked[first + rows - 1])
-            axes.tick_params(labelbottom=False)
-    panels = stacked.reshape(2, rows).T
-    return panels  # noqa: RET504 (numpy has no type for it)
+        return list(panels[:, 0]), list(panels[:, 1]) if has_slip else []
+    force, *near = figure.subplots(1 + rows, 1, height_ratios=[1.7, *ratios])
+    for axes in near[:-1]:
+        axes.sharex(near[-1])
+        axes.tick_params(labelbottom=False)
+    return [force], near
 
 
 def draw_force(axes: Axes, tree: Tree, options: Options) -> None:

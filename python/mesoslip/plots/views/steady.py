@@ -20,6 +20,11 @@ def draw(tree: xr.DataTree, options: Options, figure: Canvas | None) -> Canvas:
     """Force and critical stiffness over velocity, with the configured spring."""
     data = tree.to_dataset()
     critical = data["critical_stiffness"].values
+    if not np.isfinite(critical).any():
+        # As of a slider whose motion is prescribed.
+        figure = canvas(figure, (6.5, 3.2))
+        draw_force(figure.subplots(), tree, options)
+        return figure
     figure = canvas(figure, (6.5, 4.8))
     force, stiffness = figure.subplots(2, 1, sharex=True, height_ratios=[1.3, 1])
     draw_force(force, tree, options)

@@ -13,9 +13,9 @@ from matplotlib.lines import Line2D
 
 from mesoslip.errors import FileError
 from mesoslip.plots.boundaries import add_legend, boundary_measures, draw_contours, draw_crossings
-from mesoslip.plots.key_names import name_of, symbol_or_name
+from mesoslip.plots.key_names import name_of, plain, symbol_or_name
 from mesoslip.plots.printing import current, is_narrow
-from mesoslip.plots.style import Canvas, canvas, plain, write_title
+from mesoslip.plots.style import Canvas, canvas, write_title
 from mesoslip.plots.sweep_axis import DIRECTION, SweptKey, scale_of
 from mesoslip.plots.sweep_panels import (
     Measured,
@@ -60,8 +60,11 @@ def draw(tree: xr.DataTree, options: Options, figure: Canvas | None) -> Canvas:
     with mpl.rc_context({"axes.spines.top": True, "axes.spines.right": True}):
         figure = canvas(figure, (max(4.4, PANEL[0] * max(rows)), PANEL[1] * len(rows) + 0.4))
         lines: dict[str, Line2D] = {}
-        for axes, panel in zip(_axes(figure, rows), panels, strict=True):
+        all_axes = _axes(figure, rows)
+        for axes, panel in zip(all_axes, panels, strict=True):
             lines |= {str(one.get_label()): one for one in panel.draw(axes, norm)}
+        for axes in all_axes[:-1] if narrow else ():
+            axes.set_xlabel("")
         if current().title is None and tree.attrs.get("title"):
             figure.suptitle(plain(tree.attrs["title"]), x=0.01, ha="left")
         figure.legend(

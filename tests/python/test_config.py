@@ -1158,3 +1158,10 @@ def test_many_mistakes_are_counted(tmp_path, monkeypatch):
     # Four tables are missing.
     assert last.message == f"{2004 - 50} more errors"
     assert len(parsed) == 1
+
+
+def test_configurations_are_equal_whichever_derived_quantities_were_read(klein):
+    one, other = klein(), klein()
+    assert one.drive_parts
+    assert one == other
+    assert one != klein(contacts__delay="1 ms")

@@ -38,7 +38,7 @@ export PYTHONDONTWRITEBYTECODE :=
 .DELETE_ON_ERROR:
 .PRECIOUS: out/%.nc
 .PHONY: help setup dev demo test test-python test-fortran test-debug test-sanitize test-browser test-formats figures \
-  gallery claims campaign docs docs-examples docs-pages bench fuzz mutants reference lint wheel test-wheel test-sdist \
+  gallery doc-pictures claims campaign docs docs-examples docs-pages bench fuzz mutants reference lint wheel test-wheel test-sdist \
   release-check clean
 
 help: ## Show the targets
@@ -89,6 +89,10 @@ test-formats: $(INSTALLED) $(FORMATS) ## Read and check outputs with other progr
 PICTURES ?=
 gallery: $(INSTALLED) ## Draw every picture that a command makes, of small runs, into build/gallery
 	$(VENV)/bin/python tests/gallery/gallery.py $(PICTURES)
+
+# Others than stale ones: make doc-pictures PICTURES="klein response".
+doc-pictures: $(INSTALLED) ## Draw the pictures of the documentation whose runs have changed
+	tools/doc-pictures $(PICTURES)
 
 bench: $(INSTALLED) ## Measure the cost of a contact event
 	$(VENV)/bin/python tests/bench/bench.py

@@ -77,6 +77,7 @@ RUNS: dict[str, Arguments] = {
     "disc": ("trace", "runs/measured/pin-on-disc.toml"),
     "reciprocating": ("trace", "runs/measured/reciprocating.toml"),
     "stribeck": ("trace", "runs/measured/stribeck.toml"),
+    "rates": ("response", "{folder}/basalt.nc", "--posterior", "--law", "slip"),
     "curve": ("curve", "runs/source/S18.toml"),
     "curve-narrow": _changed(
         "curve", "runs/source/S18.toml", "contacts.threshold.relative_width=0.05"

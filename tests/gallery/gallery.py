@@ -56,12 +56,14 @@ class Outputs:
             changes = [one for change in SOURCE[name] for one in ("--set", change)]
             return self._made(name, ["run", str(source), *changes], source)
         command, file_name, *more = RUNS[name]
-        source = ROOT / file_name
+        source = ROOT / file_name.format(folder=self.folder)
+        if source.suffix == ".nc":
+            return self._made(name, [command, str(self.path(source.stem)), *more], None)
         return self._made(name, [command, str(source), *more], source)
 
-    def _made(self, name: str, typed: list[str], source: Path) -> Path:
+    def _made(self, name: str, typed: list[str], source: Path | None) -> Path:
         path, stamp = self.folder / f"{name}.nc", self.folder / f"{name}.typed"
-        text = f"{shlex.join(typed)}\n{source.read_text()}"
+        text = f"{shlex.join(typed)}\n{source.read_text() if source else ''}"
         if path.exists() and stamp.exists() and stamp.read_text() == text:
             return path
         path.unlink(missing_ok=True)

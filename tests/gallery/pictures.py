@@ -46,6 +46,7 @@ PICTURES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "response-creep": (("creep",), _view("response")),
     "response-ramps": (("ramps",), _view("response")),
     "response-measured": (("basalt",), _view("response")),
+    "rates": (("rates",), ()),
     "strokes": (("reciprocating",), _view("strokes")),
     "strokes-disc": (("disc",), _view("strokes")),
     "strokes-loops": (("loops",), _view("strokes")),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import runpy
 import shutil
 import subprocess
 import sys
@@ -144,6 +145,45 @@ def test_a_changed_chain_counts_at_once(checkout):
 def test_what_cannot_be_read_is_left_to_the_program(checkout, text):
     (checkout / "runs/broken.toml").write_text(text)
     assert made(checkout, "out/broken.nc") == ["run runs/broken.toml"]
+
+
+DOC_PICTURES = runpy.run_path(str(ROOT / "tools" / "doc-pictures"))
+
+
+def test_no_picture_of_the_documentation_is_stale():
+    """Each is made by commands, whose files are those with which it was drawn."""
+    assert set(DOC_PICTURES["pictures"]()) == {path.stem for path in (ROOT / "docs").glob("*.png")}
+    assert DOC_PICTURES["stale"]() == [], "make doc-pictures, or tools/doc-pictures --record"
+
+
+@pytest.mark.parametrize(
+    ("edited", "old", "new"),
+    [
+        ("runs/own.toml", "1", "2"),
+        ("runs/base.toml", "1", "2"),
+        ("docs/page.md", "3", "4"),
+        ("docs/pictures.toml", "draw", "draw anew"),
+    ],
+)
+def test_an_edit_of_what_a_picture_shows_makes_it_stale(tmp_path, edited, old, new):
+    texts = {
+        "runs/own.toml": 'base = "base.toml"\na = 1\n',
+        "runs/base.toml": "b = 1\n",
+        "docs/page.md": "A page.\n\n```toml\n# block.toml\nc = 3\n```\n",
+        "docs/pictures.toml": '[one]\ncommands = ["draw"]\n'
+        'sources = ["runs/own.toml", "docs/page.md#block.toml"]\n',
+    }
+    for name, text in texts.items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(text)
+    (one,) = DOC_PICTURES["pictures"](tmp_path).values()
+    (tmp_path / "docs/pictures.lock").write_text(f"one {DOC_PICTURES['hash_of'](tmp_path, one)}\n")
+    assert DOC_PICTURES["stale"](tmp_path) == []
+    # What the page says elsewhere does not count.
+    (tmp_path / "docs/page.md").write_text(f"Another {texts['docs/page.md']}")
+    assert DOC_PICTURES["stale"](tmp_path) == []
+    (tmp_path / edited).write_text(texts[edited].replace(old, new))
+    assert DOC_PICTURES["stale"](tmp_path) == ["one"]
 
 
 def test_the_runs_of_this_repository():

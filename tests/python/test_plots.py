@@ -116,7 +116,8 @@ def test_the_gallery_has_every_view():
     drawn = {options[1] for _, options in PICTURES.values() if options[:1] == ("--view",)}
     commands = {RUNS[name][0] for name in RUNS} | {one.split()[0] for one, _ in FILES.values()}
     assert {one.name for one in VIEWS if one.name not in OUTPUTS} <= drawn
-    assert {"run", "sweep", "cycle", "curve", "onset", "lyapunov", "fit"} <= commands
+    of_kinds = {"branches": "cycle", "steady": "curve", "rates": "response"}
+    assert {of_kinds.get(kind, kind) for kind in OUTPUTS} <= commands
     known = RUNS.keys() | FILES.keys()
     assert {one for inputs, _ in PICTURES.values() for one in inputs} <= known
     assert {name for _, name in MOVIES.values()} == {one.name for one in VIEWS if one.movie}

@@ -31,6 +31,8 @@ REGIME, FRONT_TYPE = "regime", "front_type"
 MAX_RATIO = 30.0
 COMPRESSION = 0.25
 FINE_POINTS = 20
+# Coefficients of a cubic relative to the largest that are rounding errors.
+ROUNDING = 1e-9
 # Distance of the legend from axes, in sizes of its font.
 LINES_BELOW = 3.6
 
@@ -145,14 +147,16 @@ def _crossing(boundary: Boundary, places: Array, excess: Array, left: int) -> fl
         near = excess[max(left - 1, 0) : left + 3]
         sizes = [np.nanmax(np.abs(near[near * one > 0])) for one in (low, high)]
         if np.isfinite(excess).all() and max(sizes) <= MAX_RATIO * min(sizes):
-            cubic = Polynomial(CubicSpline(places, excess).c[::-1, left])
+            # In a unit interval; rounding errors of a straight line would have turns of their own.
+            powers = CubicSpline(places, excess).c[::-1, left] * (stop - start) ** np.arange(4)
+            cubic = Polynomial(powers).trim(ROUNDING * np.abs(powers).max())
             turns, zeros = (
-                [start + one.real for one in each.roots() if np.isreal(one)]
+                [float(one.real) for one in each.roots() if np.isreal(one)]
                 for each in (cubic.deriv(), cubic)
             )
-            inside = [one for one in zeros if start < one < stop]
-            if len(inside) == 1 and not any(start < one < stop for one in turns):
-                return float(inside[0])
+            inside = [one for one in zeros if 0 < one < 1]
+            if len(inside) == 1 and not any(0 < one < 1 for one in turns):
+                return float(start + (stop - start) * inside[0])
         low, high = (math.copysign(abs(one) ** COMPRESSION, one) for one in (low, high))
     return float(start + (stop - start) * low / (low - high))
 

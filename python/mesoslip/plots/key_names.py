@@ -103,7 +103,8 @@ def changes_in_a_line(config: Config, base: Config, room: int) -> str:
         texts.append(text if before == MISSING else f"{text} (was {was})")
     for count in range(len(texts), 0, -1):
         rest = len(texts) - count
-        line = ", ".join([*texts[:count], *([f"{rest} more changes"] if rest else [])])
+        more = f"{rest} more change{'s' if rest > 1 else ''}"
+        line = ", ".join([*texts[:count], *([more] if rest else [])])
         if shown_length(line) <= room:
             return line
         if config.title != base.title:

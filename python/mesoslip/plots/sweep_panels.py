@@ -62,7 +62,7 @@ class Measured(NamedTuple):
     @property
     def rows(self) -> list[int]:
         """The values of a choice that occur."""
-        return [int(one) for one in np.unique(self.values[np.isfinite(self.values)])]
+        return _different(self.values)
 
 
 def measured(data: xr.Dataset, name: str, label: str, unit: float) -> Measured:
@@ -189,7 +189,7 @@ def draw_map(
 
 def _draw_choice_map(axes: Axes, one: Measured, edges: tuple[Array, Array], shown: Array) -> None:
     """Draw the choices that occur, each in its colour."""
-    rows = one.rows
+    rows = _different(shown)
     colors = ListedColormap([CHOICE_COLORS[code % len(CHOICE_COLORS)] for code in rows])
     places = np.full(shown.shape, np.nan)
     for row, code in enumerate(rows):
@@ -199,6 +199,10 @@ def _draw_choice_map(axes: Axes, one: Measured, edges: tuple[Array, Array], show
     bar = axes.figure.colorbar(mesh, ax=axes, ticks=range(len(rows)), label=one.label)
     bar.ax.set_yticklabels([one.choices[code] for code in rows])
     bar.minorticks_off()
+
+
+def _different(values: Array) -> list[int]:
+    return [int(one) for one in np.unique(values[np.isfinite(values)])]
 
 
 def norm_of(panels: list[Measured]) -> Normalize:

@@ -105,7 +105,10 @@ def _slips(figure: Canvas, places: Sequence[Any], tree: xr.DataTree, after: str)
                         **style,
                     )
         label = scale.label(quantity)
-        axes.set_xlabel(label.replace(" (", "\n(") if is_narrow(figure) else label)
+        if is_narrow(figure):
+            axes.set_xlabel(label.replace(" (", "\n("), fontsize="small")
+        else:
+            axes.set_xlabel(label)
         if column == 0:
             axes.set_ylabel("share of slips")
         if is_narrow(figure):

@@ -42,6 +42,8 @@ def _draw_fit(axes: Axes, experiment: Experiment, found: Fit, scale: Scale) -> N
     parts += [f"misfit {percent(misfit)}"] if misfit > MAX_MISFIT else []
     label = fit_label(axes, parts)
     axes.plot(drive / scale.size, force, **FITTED, label=label)
+    # Visible in the noise too, without hiding peaks.
+    axes.plot(drive / scale.size, force, ":", color=RED, linewidth=0.6)
     axes.legend(loc="best")
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -38,6 +37,8 @@ ROWS = {0: [1], 1: [1], 2: [2], 3: [3], 4: [2, 2], 5: [3, 2], 6: [3, 3]}
 MAP_COLUMNS = 3
 # Width and height of a panel [inch].
 PANEL = (3.0, 2.4)
+# Those of a figure with a single panel.
+ALONE = (4.4, 3.6)
 
 
 def draw(tree: xr.DataTree, options: Options, figure: Canvas | None) -> Canvas:
@@ -58,7 +59,8 @@ def draw(tree: xr.DataTree, options: Options, figure: Canvas | None) -> Canvas:
         norm = None if panels[0].measured.choices else norm_of([one.measured for one in panels])
     rows = [1] * len(panels) if narrow else rows
     with mpl.rc_context({"axes.spines.top": True, "axes.spines.right": True}):
-        figure = canvas(figure, (max(4.4, PANEL[0] * max(rows)), PANEL[1] * len(rows) + 0.4))
+        size = PANEL[0] * max(rows), PANEL[1] * len(rows) + 0.4
+        figure = canvas(figure, size if len(panels) > 1 else ALONE)
         lines: dict[str, Line2D] = {}
         all_axes = _axes(figure, rows)
         for axes, panel in zip(all_axes, panels, strict=True):
@@ -77,13 +79,15 @@ def draw(tree: xr.DataTree, options: Options, figure: Canvas | None) -> Canvas:
 
 
 def _axes(figure: Canvas, rows: list[int]) -> list[Axes]:
-    """Axes in rows of a number of panels each; a row of fewer panels has wider ones, if it can."""
-    whole = math.lcm(*set(rows)) if sum(rows) <= MAX_PANELS else max(rows)
-    grid = figure.add_gridspec(len(rows), whole)
+    """Axes in rows of a number of panels each; in an overview they fill their rows."""
+    # A grid for each row: constrained layout fails where colour bars share columns of a finer one.
+    grid, fills = figure.add_gridspec(len(rows), 1), sum(rows) <= MAX_PANELS
+    places = [
+        grid[row].subgridspec(1, count if fills else max(rows)) for row, count in enumerate(rows)
+    ]
     return [
-        figure.add_subplot(grid[row, span * column : span * (column + 1)])
-        for row, count in enumerate(rows)
-        for span in [whole // count if sum(rows) <= MAX_PANELS else 1]
+        figure.add_subplot(place[column])
+        for place, count in zip(places, rows, strict=True)
         for column in range(count)
     ]
 
@@ -93,13 +97,14 @@ def _about_means(panels: list[Measured]) -> str:
     count = max(one.realizations for one in panels)
     if count == 1:
         return "one realization of each point"
-    parts = [f"mean of {count} realizations"]
-    numbers = [one for one in panels if not one.choices]
-    if numbers and numbers[0].values.ndim == 2:
-        parts.append("bars: standard error")
-    if any(one.choices for one in panels):
-        parts.append("areas: their share" if panels[0].values.ndim == 2 else "the most frequent")
-    return "; ".join(parts) if numbers else f"{count} realizations; {parts[-1]}"
+    has_choices = any(one.choices for one in panels)
+    has_numbers = not all(one.choices for one in panels)
+    if panels[0].values.ndim > 2:
+        words = [*(["mean"] * has_numbers), *(["most frequent"] * has_choices)]
+        return f"{' or '.join(words)} of {count} realizations"
+    means = f"mean of {count} realizations; bars: standard error"
+    shares = "areas: their share" if has_numbers else f"areas: share of {count} realizations"
+    return "; ".join([*([means] * has_numbers), *([shares] * has_choices)])
 
 
 def draw_panel(axes: Axes, tree: xr.DataTree, options: Options) -> None:

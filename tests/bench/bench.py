@@ -19,7 +19,10 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parent))
 from fixed_step import numba_run, numpy_steps, verlet_run
 from mesoslip import Config
+from mesoslip.output.writing import write_results
+from mesoslip.simulation.checkpoint import Checkpoint
 from mesoslip.simulation.realization import Realization
+from mesoslip.simulation.run_realizations import run_realizations
 from mesoslip.theory.force_curve import ForceCurve
 
 ROOT = Path(__file__).parents[2]
@@ -52,6 +55,11 @@ KIND_GOALS = {
     "ageing log, f_T = 0.02 f_s": 3.5,
     "track": 1.1,
 }
+
+# The same of a short realization [us], and of a stop near the end of 10^5 [s].
+SHORT_REALIZATIONS = 20_000
+SHORT_GOAL = 60.0
+STOP_GOAL = 3.0
 
 # What was measured beside its goal, for the table at the end: name, value, sign, goal, unit.
 met: list[tuple[str, float, str, float, str]] = []
@@ -529,6 +537,31 @@ def command_cost() -> None:
             )
 
 
+def short_realizations() -> None:
+    """Many realizations of 2 contacts, with their checkpoint and output, over two workers."""
+    print("\nRealizations of 2 contacts, two workers, each")
+    changes = ["contacts.count=2", "run.duration=20ms", "output.interval=10ms"]
+    config = Config.load(KLEIN, [*changes, f"run.realizations={SHORT_REALIZATIONS}"])
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder)
+        with Checkpoint(path / "short.checkpoint", config) as checkpoint:
+            wall, processor = time.perf_counter(), time.process_time()
+            results = run_realizations(config, executor=2, checkpoint=checkpoint)
+            write_results(results, path / "short.nc", threads=2)
+            each = 1e6 / SHORT_REALIZATIONS
+            wall = (time.perf_counter() - wall) * each
+            processor = (time.process_time() - processor) * each
+            print(f"  {wall:.0f} us, {processor:.0f} us of the processor, goal {SHORT_GOAL}")
+            met.append(("a realization of 2 contacts", wall, "<=", SHORT_GOAL, "us"))
+            start = time.process_time()
+            checkpoint.write(results.realizations)
+            write_results(results, path / "partial.nc")
+            seconds = (time.process_time() - start) / SHORT_REALIZATIONS * 1e5
+            print(f"  stopped near the end of 10^5: {seconds:.1f} s of the processor", end="")
+            print(f", goal {STOP_GOAL}")
+            met.append(("a stop of 10^5 realizations", seconds, "<=", STOP_GOAL, "s"))
+
+
 def table_of_goals() -> None:
     """Each number that has a goal, beside it."""
     print("\nWhat was measured, and its goal")
@@ -560,6 +593,7 @@ def main() -> None:
     layered_cost()
     interaction_cost()
     quasistatic_cost()
+    short_realizations()
     command_cost()
     table_of_goals()
     print(f"All of it took {time.perf_counter() - start:.0f} s.")

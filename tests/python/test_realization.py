@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import doctest
+import gc
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from mesoslip.execution.local import LocalPool
 from mesoslip.execution.stop import Stop
 from mesoslip.output import layout
 from mesoslip.simulation import realization
+from mesoslip.simulation import run_realizations as module
 from mesoslip.simulation.checkpoint import Checkpoint
 from mesoslip.simulation.kernel import TABLE_NAMES
 from mesoslip.simulation.kernel_setup import tables_of
@@ -168,9 +170,14 @@ def test_many_short_realizations_are_set_up_once_and_handed_over_in_batches(monk
         LocalPool, "submit", lambda *given: submitted.append(given[2]) or submit(*given)
     )
     monkeypatch.setattr(realization, "check_memory", lambda one: checked.append(one) or check(one))
-    config = Config.from_dict(klein_tables(run__realizations=1000, **FEW))
-    results = run_realizations(config, executor=2)
+    monkeypatch.setattr(module, "MANY", 999)
+    config, collects = Config.from_dict(klein_tables(run__realizations=1000, **FEW)), []
+    results = run_realizations(
+        config, executor=2, progress=lambda _: collects.append(gc.isenabled())
+    )
     assert results.complete
+    assert not any(collects)
+    assert gc.isenabled()
     assert len(checked) == 1
     assert sum(map(len, submitted)) == 1000
     assert len(submitted) < 200

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip.configuration.config import Config
-from mesoslip.output.layout import Entry, GroupLayout
+from mesoslip.output.layout import DIMENSIONS, Entry, GroupLayout
 from mesoslip.simulation.recorded_tables import BLOCK_NUMBERS as NUMBERS_OF_BLOCK
 
 if TYPE_CHECKING:
@@ -90,11 +90,12 @@ def row_count(results: Results, layout: Mapping[str, GroupLayout]) -> int:
     count = 0
     for form in layout.values():
         for table, entries in _by_table(form).items():
-            lengths = [len(one.rows(table)) for one in results.realizations]
-            has_padded = any(one.is_padded for one in entries.values())
-            count += sum(lengths)
-            if has_padded and not all(one.is_padded for one in entries.values()):
-                count += max(lengths)
+            if table in DIMENSIONS:
+                count += form.sizes[DIMENSIONS[table]]
+                continue
+            count += sum(len(one.rows(table)) for one in results.realizations)
+            if not all(one.is_padded for one in entries.values()):
+                count += layout[""].sizes["time"]
     return count
 
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import gc
 import time
-from collections.abc import Callable, Sequence
-from contextlib import closing
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -22,6 +23,8 @@ from mesoslip.simulation.recorded_tables import Rows
 if TYPE_CHECKING:
     from mesoslip.simulation.checkpoint import Checkpoint
 
+# Number of realizations above which Python's search for garbage costs as much as short ones.
+MANY = 1000
 NO_MEMORY = (
     "not enough memory for the record: a larger output.avalanche_size or output.snapshot_size, or "
     "a longer output.interval, needs less"
@@ -104,10 +107,11 @@ class _Run:
         """Advance all realizations to their ends, unless stopped."""
         waiting = [one for one in self.realizations if not one.finished]
         self._done = len(self.realizations) - len(waiting)
-        if self._executor.shares_memory:
-            self._compute_here(waiting, stop)
-        else:
-            self._compute_elsewhere(waiting, stop)
+        with _collection_paused(len(waiting) > MANY):
+            if self._executor.shares_memory:
+                self._compute_here(waiting, stop)
+            else:
+                self._compute_elsewhere(waiting, stop)
 
     def _compute_here(self, waiting: Sequence[Realization], stop: Stop) -> None:
         batches = Batches(waiting)
@@ -176,6 +180,20 @@ class _Run:
             self._progress(min(1.0, (self._done + part) / len(self.realizations)))
         if self._checkpoint is not None:
             self._checkpoint.update(self.realizations)
+
+
+@contextmanager
+def _collection_paused(is_wanted: bool) -> Iterator[None]:
+    """Without searches for cyclic garbage, of which realizations make none: each would look through
+    all of them."""
+    pauses = is_wanted and gc.isenabled()
+    if pauses:
+        gc.disable()
+    try:
+        yield
+    finally:
+        if pauses:
+            gc.enable()
 
 
 def compute_realizations(

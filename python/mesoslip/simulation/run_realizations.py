@@ -61,19 +61,20 @@ def run_realizations(
     run.check()
     has_failed = False
     requested = Stop(stop)
-    try:
-        with requested.on_interrupt():
-            run.compute(requested)
-    except (PoolError, WorkerLostError):
-        raise
-    except MesoslipError:
-        has_failed = True
-        raise
-    finally:
-        # A run that did not fail can be resumed, whatever has ended it.
-        is_complete = all(one.finished for one in run.realizations)
-        if checkpoint is not None and not (has_failed or is_complete):
-            checkpoint.write(run.realizations)
+    with _collection_paused(len(run.realizations) > MANY):
+        try:
+            with requested.on_interrupt():
+                run.compute(requested)
+        except (PoolError, WorkerLostError):
+            raise
+        except MesoslipError:
+            has_failed = True
+            raise
+        finally:
+            # A run that did not fail can be resumed, whatever has ended it.
+            is_complete = all(one.finished for one in run.realizations)
+            if checkpoint is not None and not (has_failed or is_complete):
+                checkpoint.write(run.realizations)
     return Results(config, run.realizations, is_complete, before + time.perf_counter() - start)
 
 
@@ -107,11 +108,10 @@ class _Run:
         """Advance all realizations to their ends, unless stopped."""
         waiting = [one for one in self.realizations if not one.finished]
         self._done = len(self.realizations) - len(waiting)
-        with _collection_paused(len(waiting) > MANY):
-            if self._executor.shares_memory:
-                self._compute_here(waiting, stop)
-            else:
-                self._compute_elsewhere(waiting, stop)
+        if self._executor.shares_memory:
+            self._compute_here(waiting, stop)
+        else:
+            self._compute_elsewhere(waiting, stop)
 
     def _compute_here(self, waiting: Sequence[Realization], stop: Stop) -> None:
         batches = Batches(waiting)

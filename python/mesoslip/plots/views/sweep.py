@@ -120,7 +120,7 @@ def draw_panel(axes: Axes, tree: xr.DataTree, options: Options) -> None:
 
 
 def measures(data: xr.Dataset) -> list[str]:
-    """Measures of a sweep that have a picture: with the regime, not those of its boundaries."""
+    """Measures of a sweep that have a picture: not those that are boundaries in another."""
     names = [str(name) for name in data.data_vars if name != "status"]
     lines = boundary_measures(names)
     return [name for name in names if name not in lines]

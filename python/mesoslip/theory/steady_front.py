@@ -28,7 +28,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mesoslip.configuration.sliders.interface import InterfaceSlider
 from mesoslip.errors import ConfigError, Problem
 
 if TYPE_CHECKING:
@@ -75,7 +74,7 @@ class SteadyFront:
 
     def __init__(self, config: Config) -> None:
         slider, contacts = config.slider, config.contacts
-        if not isinstance(slider, InterfaceSlider) or slider.blocks < 2:
+        if slider.block_count < 2:
             message = 'fronts run along the blocks of slider.kind = "interface", two or more'
             raise ConfigError([Problem("", "slider.kind", message, slider.kind)])
         rate, spring = slider.neighbour_frequency, slider.neighbour_spring

@@ -104,6 +104,41 @@ def chain_stiffness(slider: LayeredSlider, rate: Any, stiffness: Any) -> tuple[C
     return numerator, denominator
 
 
+class RowScales(NamedTuple):
+    """A row of blocks in units of the mass and the springs of neighbours, with its velocity of
+    sound [m/s]."""
+
+    sound_velocity: float
+    contacts: float
+    top: float
+    edge: float
+    drag: float
+    viscosity: float
+    damping: float
+
+
+@singledispatch
+def row_scales(slider: SliderTable, config: Config) -> RowScales | None:  # noqa: ARG001
+    """Stiffnesses of contacts and drive, drag and damping of a block; None without neighbours."""
+    return None
+
+
+@row_scales.register
+def _interface_scales(slider: InterfaceSlider, config: Any) -> RowScales | None:
+    if slider.blocks < 2:
+        return None
+    contacts, rate, spring = config.contacts, slider.neighbour_frequency, slider.neighbour_spring
+    return RowScales(
+        sound_velocity=slider.sound_velocity,
+        contacts=contacts.stiffness / slider.blocks / spring,
+        top=slider.total_top_stiffness / slider.blocks / spring,
+        edge=slider.edge_stiffness / spring,
+        drag=contacts.count * contacts.contact_drag / slider.mass / rate,
+        viscosity=slider.neighbour_damping / rate,
+        damping=slider.damping_rate / rate,
+    )
+
+
 @singledispatch
 def mode_frequencies(slider: SliderTable) -> list[float]:  # noqa: ARG001
     """Frequencies of layers with free contacts and with clamped ones, ascending [1/s].

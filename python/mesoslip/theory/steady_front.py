@@ -29,6 +29,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mesoslip.errors import ConfigError, Problem
+from mesoslip.theory.sliders import row_scales
 
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
@@ -73,18 +74,13 @@ class SteadyFront:
     """
 
     def __init__(self, config: Config) -> None:
-        slider, contacts = config.slider, config.contacts
-        if slider.block_count < 2:
+        scales = row_scales(config.slider, config)
+        if scales is None:
             message = 'fronts run along the blocks of slider.kind = "interface", two or more'
-            raise ConfigError([Problem("", "slider.kind", message, slider.kind)])
-        rate, spring = slider.neighbour_frequency, slider.neighbour_spring
-        self.sound_velocity = slider.sound_velocity
-        self._contacts = contacts.stiffness / slider.blocks / spring
-        self._top = slider.total_top_stiffness / slider.blocks / spring
-        self._edge = slider.edge_stiffness / spring
-        self._drag = contacts.count * contacts.contact_drag / slider.mass / rate
-        self._viscosity = slider.neighbour_damping / rate
-        self._damping = slider.damping_rate / rate
+            raise ConfigError([Problem("", "slider.kind", message, config.slider.kind)])
+        self.sound_velocity = scales.sound_velocity
+        self._contacts, self._top, self._edge = scales.contacts, scales.top, scales.edge
+        self._drag, self._viscosity, self._damping = scales.drag, scales.viscosity, scales.damping
 
     @property
     def prestress(self) -> float:

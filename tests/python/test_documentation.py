@@ -45,9 +45,14 @@ PAGES = [
 ]
 # Pages whose runs take some seconds: `make docs` runs them.
 LONG_PAGES = [
+    "campaigns.md",
     "cycles.md",
+    "how-to/avalanches.md",
+    "how-to/change-a-parameter.md",
+    "how-to/infinitely-many-contacts.md",
     "how-to/measured-surface.md",
     "how-to/pictures.md",
+    "how-to/quasi-static.md",
     "how-to/slide-hold-slide.md",
     "how-to/which-motion.md",
     "questions.md",

@@ -2,8 +2,8 @@
 !>
 !> A block slips while it is faster than the drive by the slip velocity, and until it has been
 !> slower for the quiet time. It ruptures when half of the contacts break that were pinned when it
-!> was slow and most of them were: in the slip, or before it, as contacts that break together do
-!> before the block gets fast.
+!> was slow and most of them were: in the slip, or just before it, as contacts that break together
+!> do before the block gets fast.
 module mesoslip_recording_ruptures
    use mesoslip_numerics_archive, only: archive_type
    use mesoslip_numerics_errors, only: error_type, raise, status_memory
@@ -32,7 +32,9 @@ module mesoslip_recording_ruptures
       logical :: is_open = .false.
       !> When it began, when the block was fast last, and when it ruptured, or never [s]
       real(wp) :: start_time = 0.0_wp, last_time = 0.0_wp, rupture_time = never
-      !> Force [N], displacement [m] and breaks before it, breaks at which the block ruptures
+      !> When it was slow last with most contacts pinned [s]
+      real(wp) :: pinned_time = 0.0_wp
+      !> Force [N], displacement [m] and breaks then, and breaks at which the block ruptures
       real(wp) :: start_force = 0.0_wp, start_place = 0.0_wp, start_breaks = 0.0_wp, limit = never
       !> Force [N] and displacement [m] when it was fast last, and maximum of its velocity [m/s]
       real(wp) :: last_force = 0.0_wp, last_place = 0.0_wp, peak_velocity = 0.0_wp
@@ -118,9 +120,14 @@ contains
          if (slip%is_open .and. time > slip%last_time + self%quiet_time) then
             call self%close_slip(block, breaks)
          end if
-         if (slip%is_open .or. pinned_part < broken_part) return
-         slip = block_slip_type(start_force=force, start_place=place, start_breaks=breaks, &
-            & limit=breaks + max(1.0_wp, broken_part * pinned))
+         if (slip%is_open) return
+         if (pinned_part >= broken_part) then
+            slip = block_slip_type(pinned_time=time, start_force=force, start_place=place, &
+               & start_breaks=breaks, limit=breaks + max(1.0_wp, broken_part * pinned))
+         else if (time > slip%pinned_time + self%quiet_time) then
+            ! It slides without a slip.
+            slip = block_slip_type()
+         end if
       end associate
    end subroutine note_motion
 
@@ -133,7 +140,7 @@ contains
       associate (slip => self%slip(block))
          if (slip%rupture_time < never) then
             call self%catalogue%add([real(block, wp), slip%start_time, slip%rupture_time, &
-               & slip%last_time, slip%start_force, slip%last_force, &
+               & max(slip%last_time, slip%rupture_time), slip%start_force, slip%last_force, &
                & slip%last_place - slip%start_place, slip%peak_velocity, &
                & breaks - slip%start_breaks])
          end if
@@ -169,6 +176,7 @@ contains
             call archive%exchange("start_time", slip%start_time)
             call archive%exchange("last_time", slip%last_time)
             call archive%exchange("rupture_time", slip%rupture_time)
+            call archive%exchange("pinned_time", slip%pinned_time)
             call archive%exchange("start_force", slip%start_force)
             call archive%exchange("start_place", slip%start_place)
             call archive%exchange("start_breaks", slip%start_breaks)

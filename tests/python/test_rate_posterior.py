@@ -20,6 +20,7 @@ from mesoslip.analysis.rate_and_state import (
     fit_rows,
     records_of,
 )
+from mesoslip.analysis.rate_and_state.noise import estimated_noise
 from mesoslip.execution.stop import Stop, StoppedError
 from mesoslip.inference import rate_posterior, rate_tree, sampler
 from mesoslip.inference.rate_posterior import NOISE, Density, RatePosterior, prior_of, sample_laws
@@ -78,6 +79,27 @@ def test_the_density_of_residuals_is_that_of_their_covariance(share, time):
         size = np.linalg.slogdet(covariance)[1]
         square = residual[one] @ np.linalg.solve(covariance, residual[one])
         assert found[one] == pytest.approx(-0.5 * (size + square), rel=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_estimated_noise_is_the_likeliest(seed):
+    """Also where the search begins at equal parts, of which the logarithm of the ratio is 0."""
+    at = 0.05 * np.arange(400.0)
+    count, spread = np.full(at.size, 3.0), np.full(at.size, 0.05 / 12**0.5)
+    points = Points((), at, spread, at, count.astype(int), count, 0.05 / 3)
+    model = NoiseModel.of(points)
+    rng = np.random.default_rng(seed)
+    factor = np.linalg.cholesky(model.covariance(1.0, 0.6, 0.4))
+    residual = factor @ rng.standard_normal(at.size)
+    # Without parameters the restricted likelihood is the likelihood.
+    found = estimated_noise(points, residual, np.zeros((at.size, 1)))
+    here = (found.deviation, found.share, found.time)
+    best = model.log_likelihood(residual[None], *np.array(here)[:, None])[0]
+    for index, (low, high) in enumerate([(0.97, 1.03), (0.9, 1.1), (0.8, 1.25)]):
+        for change in (low, high):
+            near = np.array(here)
+            near[index] *= change
+            assert model.log_likelihood(residual[None], *near[:, None])[0] < best + 0.1
 
 
 def test_the_density_of_a_nearly_linear_law_is_that_of_least_squares(fit):

@@ -163,6 +163,15 @@ def test_realizations_run_together_end_with_the_first_that_is_long_or_has_starte
         np.testing.assert_array_equal(one.trace, other.trace)
 
 
+def test_rows_of_one_realization_keep_no_others_in_memory():
+    config = Config.from_dict(klein_tables(run__realizations=20, **FEW | {"contacts__count": 9}))
+    some = Realization.all_of(config)
+    assert Realization.run_together(some) == 20
+    pieces = [piece for one in some for piece in one.rows("trace").pieces]
+    assert len(pieces) == 20
+    assert all(piece.base is None for piece in pieces)
+
+
 def test_many_short_realizations_are_set_up_once_and_handed_over_in_batches(monkeypatch):
     submitted, checked = [], []
     submit, check = LocalPool.submit, realization.check_memory

@@ -21,7 +21,7 @@ from mesoslip.command_line.options import (
     workers_option,
 )
 from mesoslip.command_line.progress import progress_shown, say
-from mesoslip.errors import FileError
+from mesoslip.errors import FileError, MesoslipError
 from mesoslip.execution.stop import Stop, stopped_by_signals
 
 if TYPE_CHECKING:
@@ -110,10 +110,11 @@ def run(
             threads = workers or os.cpu_count() or 1
             with progress_shown(quiet, "writing") as progress:
                 writing.write_results(results, path, threads=threads, progress=progress)
-        except FileError as error:
+        except (MesoslipError, MemoryError) as error:
             if checkpoint.write(results.realizations):
+                reason = str(error) or "there is not enough memory"
                 raise FileError(
-                    f"{error}; the results are in {checkpoint.folder}: the same command with "
+                    f"{reason}; the results are in {checkpoint.folder}: the same command with "
                     "--resume writes the output"
                 ) from error
             raise

@@ -123,6 +123,7 @@ def response_posterior(
     RunError
         If the motion cannot be integrated.
     """
+    laws = list(dict.fromkeys([laws] if isinstance(laws, str) else laws))
     unknown = [one for one in laws if one not in LAWS]
     if unknown:
         choice = ", ".join(repr(one) for one in LAWS)

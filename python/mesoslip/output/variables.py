@@ -265,7 +265,9 @@ RUPTURES = Group(
     rupture_time=Meaning(
         "s", "time at which half of the contacts that were pinned before the slip had broken"
     ),
-    end_time=Meaning("s", "last time at which the block was faster than the slip velocity"),
+    end_time=Meaning(
+        "s", "last time at which the block was faster than the slip velocity, or ruptured after it"
+    ),
     force_before=Meaning("N", "force of the block on its contacts just before the slip"),
     force_after=Meaning("N", "force of the block on its contacts at the end"),
     slip=Meaning("m", "displacement of the block in its slip"),

@@ -210,8 +210,6 @@ class Kernel:
             values,
         )
         progress, counts, energy, lengths = (one.T[:done] for one in (*results, rows))
-        # Rows keep no more memory than they need.
-        values = values[: int(np.sum(lengths * columns))].copy()
         widths = tuple(zip(tables, columns.tolist(), strict=True))
         completed: list[Completed] = []
         start = 0
@@ -222,7 +220,8 @@ class Kernel:
             for (table, width), length in zip(widths, several, strict=True):
                 if length:
                     end = start + length * width
-                    found[table] = values[start:end].reshape(length, width)
+                    # Its own, as one that stays in memory would keep those of all others there.
+                    found[table] = values[start:end].reshape(length, width).copy()
                     start = end
             now = Progress._make((ENDING_NAMES[ending], *reals, advances, avalanches, integrator))
             completed.append((now, terms, found))

@@ -113,7 +113,8 @@ class SteadyFront:
         """
         with np.errstate(divide="ignore"):
             times = self.sound_velocity / np.asarray(speed, dtype=float)
-        found: Array = np.vectorize(self._stress_of, otypes=[float])(times)
+        with np.errstate(invalid="ignore"):
+            found: Array = np.vectorize(self._stress_of, otypes=[float])(times)
         return found
 
     def speed(self, stress_ratio: ArrayLike) -> Array:

@@ -255,11 +255,14 @@ def estimated_noise(points: Points, residual: Array, jacobian: Array) -> Noise:
             ratio, length = np.exp(np.clip(at, low, high)).tolist()
             return ratio, length
 
+        # The simplex of scipy is flat where a logarithm is 0.
+        start = np.log(tried[1:])
+        simplex = np.add(start, [[0.0, 0.0], [1.0, 0.0], [0.0, 0.7]])
         found = minimize(
             lambda at: likelihood(*noise_of(at))[0],
-            np.log(tried[1:]),
+            start,
             method="Nelder-Mead",
-            options={"maxfev": 60, "xatol": 0.02, "fatol": 0.02},
+            options={"maxfev": 60, "xatol": 0.02, "fatol": 0.02, "initial_simplex": simplex},
         )
         best = (float(found.fun), *noise_of(found.x))
     _, ratio, length = best

@@ -1,4 +1,4 @@
-!> Short runs made again and again from what one simulation was made of.
+!> Short runs made from the recipe of one simulation.
 module mesoslip_boundary_short_runs
    use mesoslip_boundary_handles, only: recipe_type
    use mesoslip_contacts, only: make_contacts
@@ -19,7 +19,7 @@ contains
    subroutine run_short(simulation, template, recipe, realization, initial, max_work, error)
       !> The run: at its end, or at a bound
       type(simulation_type), allocatable, intent(out) :: simulation
-      !> The simulation, and what it was made of
+      !> The simulation, and its recipe
       type(simulation_type), intent(in) :: template
       type(recipe_type), intent(in) :: recipe
       !> Number of the realization

@@ -21,6 +21,7 @@ import xarray as xr
 from conftest import ROOT, klein_tables, long
 from mesoslip.command_line.main import COMMANDS, GROUPS
 from mesoslip.command_line.progress import say
+from mesoslip.errors import RunError
 
 pytestmark = pytest.mark.usefixtures("quick_pictures")
 
@@ -114,6 +115,23 @@ def test_info_prints_the_overview_first(short, tmp_path, command):
     assert command("run", short, *options, "-o", tmp_path / "steady.nc", "--quiet")[0] == 0
     counted = mesoslip.open_output(tmp_path / "steady.nc")["breaks"].values.sum()
     assert float(lines["contact_breaks"][1]) == pytest.approx(counted, rel=0.02)
+
+
+@pytest.mark.parametrize("error", [MemoryError(), RunError("a table cannot be read")])
+def test_whatever_prevents_the_output_the_results_are_kept(
+    short, tmp_path, command, monkeypatch, error
+):
+    def fails(*_, **__):
+        raise error
+
+    path = tmp_path / "out.nc"
+    with monkeypatch.context() as broken:
+        broken.setattr("mesoslip.output.writing.write_results", fails)
+        status, _, message = command("run", short, "-o", path, "--quiet")
+    assert status == 2
+    assert "with --resume writes the output" in message.replace("\n", " ")
+    assert command("run", short, "-o", path, "--quiet", "--resume")[0] == 0
+    assert mesoslip.open_output(path)["breaks"].values.sum() > 0
 
 
 def test_the_help_groups_all_commands_and_cuts_no_description(monkeypatch, command):

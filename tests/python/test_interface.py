@@ -233,6 +233,20 @@ def test_a_rupture_is_the_break_of_half_of_the_pinned_contacts():
     assert rupture["start_time"] <= rupture["rupture_time"] <= rupture["end_time"]
 
 
+def test_a_block_that_slides_without_a_slip_does_not_rupture():
+    """Most of its contacts break one by one, long before its only slip."""
+    tables = row(1, 6.0, bar_stiffness=None, damping=40.0, **TOP | {"top_stiffness": 1000.0})
+    tables["contacts"] |= {"delay": 10.0, "drag": 0.0}
+    tables["contacts"]["threshold"]["relative_width"] = 0.5
+    del tables["run"]["duration"]
+    tables["output"]["slip_velocity"] = 3.0
+    slow, fast = ({"duration": 4.2, "velocity": 0.4}, {"duration": 2.0, "velocity": 20.0})
+    tables["drive"] = {"stage": [slow, fast]}
+    one = finished(tables)
+    assert one.breaks == OF_BLOCK
+    assert not one.table("ruptures").sizes["rupture"]
+
+
 def test_a_rupture_is_at_the_break_of_half_of_the_contacts_pinned_before_it():
     """Without attachment, the contacts that are detached count the breaks."""
     tables = row(1, 6.0, bar_stiffness=None, damping=6.0, stiffness=10.0)

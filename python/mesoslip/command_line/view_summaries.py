@@ -14,7 +14,7 @@ START = "\nVIEW = View("
 
 
 class Summary(NamedTuple):
-    """Name and kind of a view, and what it shows."""
+    """Name, kind and summary of a view."""
 
     name: str
     kind: str

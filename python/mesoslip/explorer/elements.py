@@ -1,4 +1,4 @@
-"""The elements of the page: what they show, sent to the browser, and what is asked for there.
+"""The elements of the page: contents sent to the browser, and requests from there.
 
 The browser has plain HTML with labels, which `page.html` writes and `page.js` fills.
 """

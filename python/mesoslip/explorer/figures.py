@@ -23,7 +23,7 @@ FRAME_MILLISECONDS = 120
 # Lines that are drawn over those of the run, by their names in legends.
 LIMIT, PINNED, MEASURED = "N → ∞", "pinned", "measured"
 THIS = "this run"
-# Colors of the run, and of what is drawn over it.
+# Colours of the run, and of curves drawn over it.
 FIRST, CONTACT = "#1f3b6f", "#8a8f98"
 OVER = {MEASURED: "#777777", LIMIT: "#c2571a", PINNED: "#c98a00"}
 # Room for the numbers of an axis, so that axes below each other have the same length [px].

@@ -49,7 +49,7 @@ from mesoslip.simulation.run_realizations import Results
 REST = 0.15
 # Part of the run that is drawn, if the run is refused.
 REFUSED = -1
-# Keys by which a pinned run is told from the present one, at most.
+# Maximum number of keys in the label of a pinned run.
 MAX_KEYS = 3
 # Titles of the figures, for those who do not see them.
 FIGURES = {

@@ -205,7 +205,7 @@ def _build_tree(
 
 
 def _notes(one: RatePosterior, limitation: str, unit: str) -> list[str]:
-    """Sentences on what is known, and on the prior."""
+    """Sentences on known quantities, and on the prior."""
     notes = [limitation] if limitation else []
     stiffness = one.fit.law.stiffness
     if math.isfinite(stiffness):

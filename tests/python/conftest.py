@@ -122,6 +122,17 @@ def few_replicas(monkeypatch):
 
 
 @pytest.fixture
+def no_step_errors(monkeypatch):
+    """Master equations without the second run by which errors of their steps are estimated."""
+    from mesoslip.simulation.realization import Realization
+
+    def leave_out(self, *_):
+        self._lacks_errors = False
+
+    monkeypatch.setattr(Realization, "_estimate_errors", leave_out)
+
+
+@pytest.fixture
 def quick_pictures(monkeypatch):
     """Pictures that are coarse and not arranged, where it does not matter how they look."""
     from matplotlib.figure import Figure

@@ -195,7 +195,7 @@ def test_a_stream_that_takes_nothing():
     )
 
 
-@pytest.mark.parametrize("closed", ["0<&-", "1>&-", "2>&-", "0<&- 1>&- 2>&-"])
+@pytest.mark.parametrize("closed", [*map(long, ["0<&-", "2>&-"]), "1>&-", "0<&- 1>&- 2>&-"])
 def test_closed_streams(closed, short, tmp_path):
     output = tmp_path / "out.nc"
     line = f"{sys.executable} -m mesoslip run {short} -o {output} {closed}"
@@ -256,7 +256,7 @@ print(printed)
 """
 
 
-@pytest.mark.parametrize("count", [8, long(200)])
+@pytest.mark.parametrize("count", [4, long(200)])
 def test_flipped_bits(count, tmp_path):
     """Each use of a damaged file gives numbers or one message."""
     arguments = [str(OLD), str(tmp_path / "in.nc"), "5", str(count)]

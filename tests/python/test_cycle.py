@@ -77,7 +77,7 @@ def test_contacts_that_break_together():
     one_by_one = configuration(
         *TOGETHER,
         "run.engine=eq",
-        "contacts.count=100000",
+        "contacts.count=50000",
         "run.duration=8.5s",
         "output.interval=2s",
     )
@@ -166,7 +166,7 @@ def test_smooth_sliding_and_irregular_motion_are_told_apart():
     assert smooth.smooth_stable
     assert smooth.amplitude == 0
     assert "smooth sliding" in smooth.verdict
-    irregular = mesoslip.cycle(configuration("slider.damping_ratio=0.2"), max_cycles=20)
+    irregular = mesoslip.cycle(configuration("slider.damping_ratio=0.2"), max_cycles=14)
     assert irregular.motion == "irregular"
     assert irregular.spread > 0.02
     assert sum(irregular.durations) < irregular.followed

@@ -9,8 +9,8 @@ import mesoslip
 import numpy as np
 import pytest
 import tomli_w
-from conftest import klein_tables, long
-from kinds import KINDS, RAMPS, configuration
+from conftest import klein_tables
+from kinds import KINDS, RAMPS, configuration, pairwise
 from mesoslip import Config, ConfigError
 from mesoslip.simulation.realization import Realization
 from mesoslip.simulation.recorded_tables import AVALANCHE_COLUMNS
@@ -95,18 +95,8 @@ def energy_bound(kind):
     return 1e-4 if {"adams", "bdf"} & words else 1e-8 if "me" in words else 1e-12
 
 
-# Ways to attach, to end and to start, which do not change how a slider follows a ramp.
-LIKE_OTHERS = ("table", "stiffnesses", "newborn", "delays", "realizations", "to a", "steady")
-
-
-@pytest.mark.parametrize(
-    "kind",
-    [
-        long(kind) if any(one in kind for one in LIKE_OTHERS) else kind
-        for kind in KINDS
-        if "force" not in kind
-    ],
-)
+@pytest.mark.usefixtures("no_step_errors")
+@pytest.mark.parametrize("kind", pairwise(kind for kind in KINDS if "force" not in kind))
 def test_energy_of_ramps_is_balanced(kind):
     steps = {"run__resolution": 0.5} if ", me" in kind else {}
     tree = mesoslip.run(configuration(kind, **RAMPS | steps))
@@ -200,9 +190,8 @@ def test_extremes_of_a_spring_under_ramps():
     assert stages_of(tree)["end_displacement"].values == pytest.approx(ends, rel=1e-8)
 
 
-@pytest.mark.parametrize(
-    "kind", [long(kind) if any(one in kind for one in LIKE_OTHERS) else kind for kind in KINDS]
-)
+@pytest.mark.usefixtures("no_step_errors")
+@pytest.mark.parametrize("kind", pairwise(KINDS))
 def test_stages_are_what_fine_samples_show(kind):
     """Extremes are not less than those of samples, and near them; means are those of samples."""
     tree = mesoslip.run(configuration(kind, output__interval=1e-5, output__slip_interval=1e-5))

@@ -11,6 +11,8 @@ import pytest
 from conftest import ROOT
 from mesoslip import Config, ConfigError
 
+pytestmark = pytest.mark.usefixtures("no_step_errors")
+
 MASS = 1.47e-3
 FORCE = {"kind": "force", "mass": MASS, "damping": 40.0}
 # Contacts of one stiffness: pinned ones together have Nk exactly.

@@ -13,6 +13,8 @@ from mesoslip.simulation.realization import Realization
 from mesoslip.theory.derived import derived
 from scipy import linalg
 
+pytestmark = pytest.mark.usefixtures("no_step_errors")
+
 MASS, STIFFNESS = 1.47e-3, 97.0
 FORCE = 18e-6
 

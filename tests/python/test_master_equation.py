@@ -26,8 +26,8 @@ PRESCRIBED = {"slider": {"kind": "prescribed"}}
 LAYERS = {"mass": 1.47e-3, "stiffness": 97.0, "kind": "layered", "layers": 4}
 
 
-def finish(config, advances=None):
-    realization = Realization(config, 0)
+def finish(config, advances=None, *, estimates_errors=False):
+    realization = Realization(config, 0, estimates_errors=estimates_errors)
     while not realization.finished:
         realization.advance(advances)
     return realization
@@ -395,7 +395,7 @@ def test_estimated_errors_are_those_of_a_run(klein, changes):
             **dispersion(0.2),
             **changes,
         )
-        runs.append(finish(config))
+        runs.append(finish(config, estimates_errors=resolution == 0.25))
     run, fine = runs
     starts, fine_starts = run.slips[:, 1], fine.slips[:, 1]
     assert len(starts) == len(fine_starts)

@@ -13,6 +13,8 @@ from mesoslip.simulation.realization import Realization
 from mesoslip.theory.force_curve import ForceCurve
 from scipy import stats
 
+pytestmark = pytest.mark.usefixtures("no_step_errors")
+
 WIDTH = 0.08
 SLIDING = {
     "slider": {"kind": "prescribed"},

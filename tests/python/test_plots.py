@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from commands import FILES, RUNS, SOURCE
-from conftest import ROOT, long
+from conftest import ROOT, klein_tables, long
 from kinds import configuration
 from matplotlib.figure import Figure
 from mesoslip.command_line.view_summaries import summaries
@@ -71,14 +71,22 @@ def test_a_lattice_has_no_empty_space_beside_it(old, width):
         assert drawn.width * drawn.height > 0.8 * room.width * room.height
 
 
-def test_pictures_of_the_theory(klein):
-    for tree in (mesoslip.curve(klein()), mesoslip.onset(klein())):
+@pytest.fixture(scope="module")
+def theory():
+    """The force curve and the onset of slip of Klein's case."""
+    config = mesoslip.Config.from_dict(klein_tables())
+    return {"curve": mesoslip.curve(config), "onset": mesoslip.onset(config)}
+
+
+def test_pictures_of_the_theory(theory):
+    for tree in theory.values():
         axes = Figure().subplots()
         mesoslip.plot(tree, ax=axes)
         assert axes.lines
         assert isinstance(mesoslip.plot(tree), Figure)
 
 
+@pytest.mark.usefixtures("quick_pictures")
 def test_a_title_that_no_font_has_is_drawn_without_warnings(old, command, tmp_path):
     tree = old.copy()
     tree.attrs["title"] = "\u65e5\u672c \U0001f600"
@@ -230,12 +238,12 @@ def test_pictures_on_threads_leave_the_style_of_the_session(old):
 
     def draw():
         try:
-            for _ in range(3):
+            for _ in range(2):
                 mesoslip.plot(old)
         except Exception as error:
             errors.append(error)
 
-    threads = [threading.Thread(target=draw) for _ in range(4)]
+    threads = [threading.Thread(target=draw) for _ in range(3)]
     for one in threads:
         one.start()
     for one in threads:
@@ -450,9 +458,9 @@ def test_what_cannot_be_drawn_is_reported(runs, given, options, printed):
         mesoslip.plot([runs[name] for name in given], **options)
 
 
-def test_outputs_of_different_commands_are_not_drawn_together(runs, klein):
+def test_outputs_of_different_commands_are_not_drawn_together(runs, theory):
     with pytest.raises(mesoslip.FileError, match=r"is a run.* is a force curve"):
-        mesoslip.plot([runs["plain"], mesoslip.curve(klein())])
+        mesoslip.plot([runs["plain"], theory["curve"]])
 
 
 def test_what_is_of_no_known_command_is_reported(runs):
@@ -472,8 +480,8 @@ def test_waves_are_the_velocities_of_the_layers(runs):
     assert figure.axes[0].get_ylabel() == "layer, 1 at the contacts"
 
 
-def test_curves_have_dimensions_and_their_instability(klein):
-    tree = mesoslip.curve(klein())
+def test_curves_have_dimensions_and_their_instability(theory):
+    tree = theory["curve"]
     figure = mesoslip.plot(tree)
     axes = figure.axes[0]
     assert axes.get_ylabel() == "force $F$ (µN)"
@@ -485,8 +493,8 @@ def test_curves_have_dimensions_and_their_instability(klein):
     assert overlapping(figure) == []
 
 
-def test_onsets_have_dimensions_or_the_reason_why_there_is_none(klein):
-    tree = mesoslip.onset(klein())
+def test_onsets_have_dimensions_or_the_reason_why_there_is_none(klein, theory):
+    tree = theory["onset"]
     axes = mesoslip.plot(tree).axes[0]
     melting = tree["melting"].to_dataset()
     line = next(one for one in axes.lines if "S47" in str(one.get_label()))
@@ -607,7 +615,7 @@ def test_fonts_are_embedded_as_truetype(runs, tmp_path):
         # Not even a style may ask for fonts of Type 3.
         style = tmp_path / "own.mplstyle"
         style.write_text("pdf.fonttype: 3\nps.fonttype: 3\npdf.compression: 0\n")
-        mesoslip.plot(runs["plain"], path, style=style)
+        mesoslip.plot(runs["two samples"], path, style=style)
         assert wanted in path.read_bytes()
         assert refused not in path.read_bytes()
 
@@ -642,6 +650,7 @@ def test_titles_letters_and_styles(runs, tmp_path):
             mesoslip.plot(runs["plain"], **options)
 
 
+@pytest.mark.usefixtures("quick_pictures")
 def test_the_command_prints(runs, tmp_path, command):
     output = tmp_path / "run.v1.nc"
     write(runs["plain"], output)

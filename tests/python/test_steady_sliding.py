@@ -19,6 +19,8 @@ from mesoslip.theory.sliders import dynamic_stiffness
 from mesoslip.theory.steady_sliding import stability_boundary, stable_stiffness
 from scipy import special
 
+pytestmark = pytest.mark.usefixtures("no_step_errors")
+
 
 def study():
     """The study with runs of the engine."""

@@ -14,6 +14,7 @@ import mesoslip
 import numpy as np
 import pytest
 import xarray as xr
+from conftest import long
 from kill_sweep import Study, is_alive, points_of, workers_of
 from test_sweep import SIMPLE, sweep_file, tables
 
@@ -22,7 +23,7 @@ __all__ = ["sweep_file"]
 
 def test_kills_lose_nothing_and_repeat_nothing(tmp_path):
     """A short version of tests/resume/kill_sweep.py."""
-    study = Study(tmp_path, 3, np.random.default_rng(3))
+    study = Study(tmp_path, 2, np.random.default_rng(3))
     whole = study.expected()
     study.attack("killed", whole, 2)
     assert study.wrong == []
@@ -86,7 +87,7 @@ def slow(tree):
 """
 
 
-@pytest.mark.parametrize("pool", ["threads", "processes"])
+@pytest.mark.parametrize("pool", [long("threads"), "processes"])
 def test_ctrl_c_keeps_what_is_done(pool, tmp_path, sweep_file):
     """It ends at once, with all its workers, and what there is can be looked at."""
     (tmp_path / "own.py").write_text(OWN)

@@ -13,6 +13,8 @@ from mesoslip.theory.contacts import contact_theory
 from mesoslip.theory.contacts.plain_sliding import SteadySliding
 from mesoslip.theory.force_curve import ForceCurve
 
+pytestmark = pytest.mark.usefixtures("no_step_errors")
+
 PLAIN = {
     "contacts__back_force_ratio": 0.0,
     "contacts__delay": 0.0,
@@ -243,8 +245,8 @@ def test_the_force_of_many_samples_becomes_that_of_steady_sliding(klein):
 @pytest.fixture(scope="module")
 def few_samples():
     """The force curve of some samples of two peaks."""
-    law = two_peaks(300, seed=2)
-    tables = klein_tables(contacts__threshold=law, curve={"length": 3e-8})
+    law = two_peaks(150, seed=2)
+    tables = klein_tables(contacts__threshold=law, curve={"length": 1.6e-8})
     return ForceCurve(Config.from_dict(tables))
 
 

@@ -12,6 +12,8 @@ from mesoslip.theory.contacts.plain_sliding import SteadySliding
 from mesoslip.theory.force_curve import ForceCurve
 from mesoslip.theory.life_transforms import LifeTransforms
 
+pytestmark = pytest.mark.usefixtures("no_step_errors")
+
 PRESCRIBED = {
     "contacts__delay": 0.0,
     "contacts__drag_rate": 0.0,

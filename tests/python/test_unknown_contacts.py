@@ -113,7 +113,6 @@ print(answers)
 """
     expected = {"info": True, "curve": True, "onset": True, "cycle": True}
     assert outcome(program, kind=True) == str(expected)
-    assert outcome(program, kind=False) == str(expected)
 
 
 def test_a_law_of_delays_without_a_theory_is_refused(klein, monkeypatch):

@@ -48,6 +48,19 @@ def test_it_comes_to_a_time_and_no_farther_than_the_next_event(klein, whole):
     assert not one.is_open
 
 
+def test_a_slip_does_not_carry_it_past_a_time(klein):
+    # Advances in a slip are a thousand times shorter than those after it.
+    config = klein(run__duration=2.0, contacts__delay=2e-3, slider__stiffness=141.0)
+    with Realization(config, estimates_errors=False) as one:
+        one.advance_to(1.3)
+        one.advance_to(1.4)
+        assert one.breaks > 0
+        assert 1.4 <= one.time < 1.4 + 2 * config.output_interval
+        one.advance_to(2.0)
+        with pytest.raises(RunError, match="the run is over, so it has no twin"):
+            one.twin(1e-12)
+
+
 @pytest.mark.parametrize("name", [name for name, columns in COLUMNS.items() if columns])
 def test_tables_have_the_columns_of_the_kernel(whole, name):
     table = whole.records(name)

@@ -88,6 +88,7 @@ class Realization(Recorded):
             "_has_steps",
             "_is_discrete",
             "_after",
+            "_has_failed",
             "_start",
             "_energy",
             "_recorded",
@@ -140,6 +141,7 @@ class Realization(Recorded):
             self._lacks_errors = estimates_errors and after is None
             self.force_error = self.slip_time_error = math.nan
         self._after = after
+        self._has_failed = False
         self._start = START
         self._energy: Array | None = None
         self._recorded = tables_of(config)
@@ -215,8 +217,11 @@ class Realization(Recorded):
             else:
                 kernel.advance(advances or ANY_NUMBER, work or float(ANY_NUMBER))
             self._take(kernel)
-        except RunError as error:
-            raise RunError(f"realization {self.number}: {error}") from None
+        except (RunError, MemoryError) as error:
+            self._has_failed = True
+            if isinstance(error, MemoryError):
+                raise
+            raise type(error)(f"realization {self.number}: {error}") from None
         seconds = time.perf_counter() - start
         self.kernel_seconds += seconds
         if advances is None and work is None:
@@ -247,7 +252,7 @@ class Realization(Recorded):
     def advance_to(self, time: float) -> None:
         """Advance until a time [s] is reached, or the run is over.
 
-        The run stops at the first event at or after the time, at most 500 intervals of the trace
+        The run stops at an event at or after the time, as a rule less than an interval of the trace
         later.
 
         Raises
@@ -256,11 +261,14 @@ class Realization(Recorded):
             If the kernel fails.
         """
         before, advances = self.time, 1
+        # Longest duration of an advance: those in a slip are much shorter than those before it.
+        longest = self.config.output_interval
         while not self.finished and self.time < time:
             self.advance(advances)
-            pace, before = self.time - before, self.time
-            # Half the remaining time at the present pace, so as not to pass the end.
-            wanted = 0.5 * (time - self.time) / pace * advances if pace > 0 else 2.0 * advances
+            longest = max(longest, (self.time - before) / advances)
+            before = self.time
+            # Half of what certainly does not pass the end.
+            wanted = 0.5 * (time - self.time) / longest
             advances = int(min(max(1.0, wanted), 2.0 * advances, MAX_ADVANCES))
 
     @property
@@ -287,7 +295,14 @@ class Realization(Recorded):
         distance
             Displacement of its drive ahead of this one's [m]; for sliders with inertia on a spring
             (`rigid`, `layered`).
+
+        Raises
+        ------
+        RunError
+            If the run is over.
         """
+        if self.ending:
+            raise RunError(f"realization {self.number}: the run is over, so it has no twin")
         saved = self.save()
         other = type(self)(self.config, self.number, estimates_errors=False)
         other._start = self._start
@@ -383,6 +398,11 @@ class Realization(Recorded):
     def is_open(self) -> bool:
         """Whether it has a kernel, which a thread may use."""
         return self._kernel is not None
+
+    @property
+    def has_failed(self) -> bool:
+        """Whether an advance failed, after which its state is not that of a run."""
+        return self._has_failed
 
     @property
     def finished(self) -> bool:

@@ -206,7 +206,7 @@ def test_what_was_computed_before_memory_ran_out_is_kept(stage, tmp_path, monkey
         take(self, kernel)
 
     monkeypatch.setattr(Realization, "run_together", staticmethod(lambda _: 0))
-    monkeypatch.setattr(realization, "SEGMENT_WORK", 500.0)
+    monkeypatch.setattr(realization, "FIRST_WORK", 500.0)
     with Checkpoint(tmp_path, config, interval=1e-9) as checkpoint:
         with monkeypatch.context() as scarce:
             scarce.setattr(Realization, "_take", short_of_memory)

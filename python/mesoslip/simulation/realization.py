@@ -49,9 +49,11 @@ ENDINGS = {
 NO_ENERGY = np.full(len(ENERGY_COLUMNS), np.nan)
 NO_ENERGY.flags.writeable = False
 
-# Wall time of a segment, after which progress and signals are checked [s]; work of the first one.
+# Wall time of a segment, after which progress and signals are checked [s]; work of the first one,
+# of which populations with many heights take 60 µs each; work of short realizations.
 SEGMENT_SECONDS = 0.25
-SEGMENT_WORK = 100_000.0
+FIRST_WORK = 2_000.0
+SHORT_WORK = 100_000.0
 # Work of estimating the errors over the whole work.
 COARSE_PART = 0.25
 # No bound on the advances or the work of a segment.
@@ -149,7 +151,7 @@ class Realization(Recorded):
         self._setup: KernelSetup | None = None
         self._kernel: Kernel | None = None
         self._words: Words | None = None
-        self._work = SEGMENT_WORK
+        self._work = FIRST_WORK
         self._lock = threading.Lock()
 
     @classmethod
@@ -362,7 +364,7 @@ class Realization(Recorded):
                 [one.number for one in realizations],
                 first.config.contacts.initial,
                 first._recorded,
-                SEGMENT_WORK,
+                SHORT_WORK,
             )
         finally:
             kernel.close()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import PurePath
 
 # Maximum number of characters of a value in messages.
 MAX_SHOWN = 100
@@ -43,9 +44,9 @@ class Problem:
 
 
 def shown(value: object) -> str:
-    """A value as a message shows it, shortened if it is long."""
+    """A value as a message shows it, shortened if it is long; a path as it is written."""
     try:
-        text = repr(value)
+        text = str(value) if isinstance(value, PurePath) else repr(value)
     # Python refuses integers of thousands of digits and tables nested without end.
     except (ValueError, RecursionError):
         return f"a {type(value).__name__} that is too long to show"
@@ -76,3 +77,7 @@ class WriteError(FileError):
 
 class RunError(MesoslipError):
     """A run that failed."""
+
+
+class NoMemoryError(RunError):
+    """A run that failed for lack of memory, and would not with more."""

@@ -119,18 +119,20 @@ def shared(name: str, folder: Path) -> Report:
         arguments = [what, case, "-o", output, "--quiet"]
     first = Command(arguments, folder)
     time.sleep(random.uniform(0, 0.5))
-    (folder.parent / "other").mkdir()
-    second = Command(arguments, folder.parent / "other")
-    if random.random() < 0.5:
+    # What each says goes into the folder above its own.
+    (folder.parent / "other" / "folder").mkdir(parents=True)
+    second = Command(arguments, folder.parent / "other" / "folder")
+    sent = random.choice(SIGNALS) if random.random() < 0.5 else None
+    if sent is not None:
         time.sleep(random.uniform(0, 1))
-        random.choice([first, second]).send(random.choice(SIGNALS))
+        random.choice([first, second]).send(sent)
     report = Report("finished")
     for one in (first, second):
         printed = one.wait(SECONDS)
         if printed is None:
             one.kill()
             report.problems.append("hang")
-        elif printed.status >= 0:
+        elif printed.status >= 0 and (sent is None or printed.status != 128 + sent):
             report.problems += wrong_words(printed)
     again = Command(arguments, folder).wait(SECONDS)
     if again is None or again.status != 0:

@@ -104,6 +104,25 @@ def test_energy_of_ramps_is_balanced(kind):
     assert tree.attrs["audit"] == "passed"
 
 
+def test_the_direction_of_the_drive_decides_what_is_in_reach(klein):
+    def message(target, *stages, **more):
+        tables = {"run": {"stop": {"displacement": target}, **more}}
+        return klein(
+            **tables, drive={"stage": list(stages)} if stages else {"velocity": -1e-7}
+        ).unreachable_stop
+
+    assert "does not move in this direction" in message(1e-6, duration=20.0)
+    assert message(-1e-6, duration=20.0) is None
+    there_and_back = {"velocity": 1e-6, "duration": 1.0}, {"velocity": -1e-6, "duration": 3.0}
+    assert message(0.9e-6, *there_and_back) is None
+    assert message(-2.1e-6, *there_and_back) is None
+    assert "the drive moves 1 µm in" in message(1.5e-6, *there_and_back)
+    # A ramp stands after 1 s, 0.5 µm away.
+    ramp = {"start_velocity": 1e-6, "end_velocity": -1e-6, "duration": 2.0}
+    assert "the drive moves 500 nm in" in message(0.9e-6, ramp)
+    assert "does not move" in message(-0.9e-6, ramp)
+
+
 def test_a_ramp_of_a_prescribed_slider():
     """While no contact breaks the force is the stiffness times the way, a parabola."""
     start, end, duration = 1e-6, -2e-6, 3e-3

@@ -21,6 +21,7 @@ from mesoslip import Config, ConfigError, FileError
 from mesoslip.campaign.sweep_plan import Plan
 from mesoslip.execution import local
 from mesoslip.execution.executors import ThreadsThenProcesses, as_executor, completed
+from mesoslip.execution.interruptible import interruptible
 from mesoslip.execution.pool import PoolError, WorkerLostError
 from mesoslip.execution.stop import Stop
 from mesoslip.execution.store import Folder, Pieces, Store
@@ -127,6 +128,19 @@ def test_a_stop_is_answered_at_once(executor):
     with closing(completed(executor, sleep_until_stopped, [60.0] * 1000, stop)) as work:
         assert not [future for _, future in work if future.exception() is None]
     assert time.monotonic() - begin < 5
+
+
+def test_an_interrupt_does_not_wait_for_a_long_call():
+    """As of the force curve in the kernel, which looks at no signal."""
+    assert interruptible(divmod, 7, 2) == (3, 1)
+    with pytest.raises(ZeroDivisionError):
+        interruptible(divmod, 1, 0)
+    timer = threading.Timer(0.05, os.kill, (os.getpid(), signal.SIGINT))
+    begin = time.monotonic()
+    timer.start()
+    with pytest.raises(KeyboardInterrupt):
+        interruptible(time.sleep, 3.0)
+    assert time.monotonic() - begin < 2.0
 
 
 def test_executors_are_checked():

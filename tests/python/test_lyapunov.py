@@ -12,6 +12,7 @@ from conftest import klein_tables
 from mesoslip.analysis.lyapunov import Orbit, growth, pooled, summary, transverse_distances
 from mesoslip.analysis.return_map import map_exponent, settled_peaks
 from mesoslip.configuration.config import Config
+from mesoslip.errors import RunError
 
 # No contact breaks: the slider on its springs is a linear system.
 PINNED = {
@@ -39,6 +40,12 @@ def test_distances_of_a_linear_system_decay_with_its_slowest_mode():
     # Windows average over the ringing; the shift in time takes a little of it off.
     assert float(tree["lyapunov_exponent"]) == pytest.approx(expected, rel=0.03)
     assert summary(tree) == "regular: small distances decay"
+
+
+def test_a_run_that_ends_before_a_twin_starts_is_too_short():
+    tables = klein_tables(**PINNED, run__stop={"displacement": 1e-9})
+    with pytest.raises(RunError, match=r"displacement of the slider reached.*a longer run is"):
+        mesoslip.lyapunov(Config.from_dict(tables), twins=4, duration=0.5, executor=1)
 
 
 def test_a_twin_that_is_not_displaced_is_the_run_itself():

@@ -121,6 +121,14 @@ def test_what_does_not_stand_out_gets_no_numbers():
         assert not row["is_described"]
 
 
+def test_a_constant_force_has_no_evolution():
+    tree = trace(noise=0.0)
+    tree["friction_coefficient"][:] = 0.6
+    (row,) = fit_rows(Experiment(tree), 0)
+    assert row["note"] == "the force is constant, so that nothing evolves"
+    assert math.isnan(row["a"])
+
+
 def test_numbers_beyond_the_friction_are_refused():
     """A fit with b of twice the friction, whatever its error."""
     (record,) = records_of(Experiment(trace()))

@@ -197,9 +197,18 @@ def test_a_law_that_does_not_describe_the_record_is_in_every_line():
     wrong = fit_laws(replace(record, laws=("slip", "slip, two states")))["slip"]
     density = Density(wrong)
     chains = density.starts(np.random.default_rng(0))[:100].reshape(2, 50, -1)
-    found = RatePosterior(wrong, density.prior, chains, is_preferred=False)
+    found = RatePosterior(wrong, density.prior, chains, is_preferred=False, noise=density.own_noise)
     table = rate_tree.rate_table(rate_tree._build_tree([found], experiment, "", 1))
     assert {one[-1] for one in table.rows} == {"not described"}
+    # Its residuals are not those of the better law, nor is its noise.
+    own, best = found.noise_by_squares[0], wrong.noise.deviation * wrong.law.scale
+    assert own > 1.5 * best
+    (printed,) = (
+        row
+        for row in rate_tree.rows_of_posterior(rate_tree._build_tree([found], experiment, "", 1))
+        if row["parameter"] == "noise"
+    )
+    assert printed["least_squares"] == pytest.approx(own)
 
 
 @pytest.fixture(scope="module")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import doctest
 import gc
+import time
 
 import numpy as np
 import pytest
@@ -46,6 +47,35 @@ def test_it_comes_to_a_time_and_no_farther_than_the_next_event(klein, whole):
             np.testing.assert_array_equal(one.records(table), whole.records(table))
         assert one.energy_terms == whole.energy_terms
     assert not one.is_open
+
+
+def test_the_first_segment_of_costly_populations_is_short(klein):
+    """Ageing and activated, of 60 µs a unit of work: an interrupt waits for the segment."""
+    config = klein(
+        **{
+            "run__engine": "me",
+            "contacts__coupling": "equal",
+            "contacts__ageing": {"law": "log", "time": 1e-3, "growth": 0.03},
+            "contacts__thermal": {"rate": 10.0, "force_ratio": 0.1},
+        }
+    )
+    with Realization(config, estimates_errors=False) as one:
+        start = time.process_time()
+        one.advance()
+        assert time.process_time() - start < 1.0
+
+
+def test_a_slip_does_not_carry_it_past_a_time(klein):
+    # Advances in a slip are a thousand times shorter than those after it.
+    config = klein(run__duration=2.0, contacts__delay=2e-3, slider__stiffness=141.0)
+    with Realization(config, estimates_errors=False) as one:
+        one.advance_to(1.3)
+        one.advance_to(1.4)
+        assert one.breaks > 0
+        assert 1.4 <= one.time < 1.4 + 2 * config.output_interval
+        one.advance_to(2.0)
+        with pytest.raises(RunError, match="the run is over, so it has no twin"):
+            one.twin(1e-12)
 
 
 @pytest.mark.parametrize("name", [name for name, columns in COLUMNS.items() if columns])
@@ -152,7 +182,7 @@ def test_realizations_run_together_end_with_the_first_that_is_long_or_has_starte
         while not one.finished:
             one.advance()
     work = sorted(one.advances + one.breaks for one in alone)[30]
-    monkeypatch.setattr(realization, "SEGMENT_WORK", work)
+    monkeypatch.setattr(realization, "SHORT_WORK", work)
     some = Realization.all_of(config)
     some[1].advance(1)
     assert Realization.run_together(some) <= 1

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import gc
+import json
 import os
 import signal
 import subprocess
@@ -21,8 +22,10 @@ from conftest import klein_tables, long
 from invariants import differences
 from kinds import KINDS, RANDOM, THERMAL, configuration, pairwise
 from mesoslip import Config, FileError, RunError
+from mesoslip.errors import NoMemoryError
 from mesoslip.execution.store import Folder
 from mesoslip.output.tree import build_tree
+from mesoslip.simulation import realization
 from mesoslip.simulation.checkpoint import Checkpoint, checkpoint_folder
 from mesoslip.simulation.kernel import Kernel
 from mesoslip.simulation.realization import Realization
@@ -170,6 +173,55 @@ def test_a_full_disk_does_not_stop_a_run(tmp_path, monkeypatch):
     assert (tmp_path / "state.npz").exists()
 
 
+def test_rows_that_a_full_disk_refused_still_count(tmp_path, monkeypatch):
+    """Also those of a realization that is over, which is never visited again."""
+    from mesoslip.simulation import checkpoint as module
+
+    monkeypatch.setattr(module, "max_waiting_bytes", lambda: 0)
+    monkeypatch.setattr(module, "RETRY_SECONDS", 0.0)
+    one = Realization(configuration("rigid"), 0)
+    with Checkpoint(tmp_path, one.config, interval=0) as checkpoint:
+        checkpoint.restore([])
+        one.advance(10**6)
+        checkpoint.visit(one)
+        with monkeypatch.context() as full:
+            full.setattr(
+                Folder, "open", lambda *_: (_ for _ in ()).throw(OSError(errno.ENOSPC, ""))
+            )
+            checkpoint.update([one])
+        checkpoint.update([one])
+        assert sum(path.stat().st_size for path in tmp_path.glob("*.rows")) > 1000
+
+
+@pytest.mark.parametrize("stage", [1, 2])
+def test_what_was_computed_before_memory_ran_out_is_kept(stage, tmp_path, monkeypatch):
+    """The realizations that are over, and of the one that failed its last state before."""
+    config, take = configuration("rigid, three realizations"), Realization._take
+    taken = []
+
+    def short_of_memory(self, kernel):
+        taken.append(self.number)
+        if taken.count(2) == stage:
+            raise MemoryError
+        take(self, kernel)
+
+    monkeypatch.setattr(Realization, "run_together", staticmethod(lambda _: 0))
+    monkeypatch.setattr(realization, "FIRST_WORK", 500.0)
+    with Checkpoint(tmp_path, config, interval=1e-9) as checkpoint:
+        with monkeypatch.context() as scarce:
+            scarce.setattr(Realization, "_take", short_of_memory)
+            with pytest.raises(NoMemoryError, match="not enough memory"):
+                run_realizations(config, executor=1, checkpoint=checkpoint)
+        assert checkpoint.is_written
+    with Checkpoint(tmp_path, config, resume=True) as checkpoint:
+        again = [Realization(config, number) for number in range(3)]
+        checkpoint.restore(again)
+    assert [one.finished for one in again[:2]] == [True, True]
+    assert_same(
+        whole("rigid, three realizations"), build_tree(advanced(config, tmp_path, None, []))
+    )
+
+
 def test_a_realization_may_end_while_a_checkpoint_is_written(tmp_path, monkeypatch):
     """Its last rows, of which some are in no file yet, belong to the next checkpoint."""
     config, printed = configuration("rigid"), []
@@ -233,6 +285,33 @@ def test_whatever_damage_a_state_has_the_one_before_is_taken(tmp_path):
         with Checkpoint(folder, config, resume=True) as checkpoint:
             checkpoint.restore([realization])
         assert realization.advances in {50, 100}
+
+
+@pytest.mark.parametrize("what", ["number", "header", "missing", "rows", "words"])
+def test_a_state_that_was_edited_is_damaged(what, tmp_path):
+    """Whatever was written into it, also with the archive's own checksums right."""
+    config, printed = configuration("rigid"), []
+    advanced(config, tmp_path, 50, [])
+    with np.load(tmp_path / "state.npz") as file:
+        arrays = dict(file)
+    if what == "number":
+        arrays["realizations"] = arrays["realizations"] + 7
+    elif what == "header":
+        header = json.loads(str(arrays["header"]))
+        del header["wall_seconds"]
+        arrays["header"] = np.array(json.dumps(header))
+    elif what == "missing":
+        del arrays["scalars.energy"]
+    elif what == "rows":
+        arrays["pieces.trace"] = arrays["pieces.trace"] + [3, 0, 0, 0, 0]
+    else:
+        arrays["words.0"][-1] += 1
+    np.savez(tmp_path / "state.npz", **arrays)
+    realization = Realization(config, 0)
+    with Checkpoint(tmp_path, config, resume=True, report=printed.append) as checkpoint:
+        checkpoint.restore([realization])
+    assert "state.npz: damaged (it differs from what the run wrote)" in printed[0]
+    assert realization.advances == 0
 
 
 def test_what_cannot_be_read_is_not_taken_for_damaged(tmp_path):

@@ -214,7 +214,7 @@ def lyapunov(
     ConfigError
         If the slider has no inertia or no spring, or there are fewer than two twins.
     RunError
-        If the run fails, or is too short for a window.
+        If the run fails, or is too short.
     """
     import xarray as xr
 
@@ -230,6 +230,11 @@ def lyapunov(
         others = []
         for start in starts:
             run.advance_to(float(start))
+            if run.finished:
+                raise RunError(
+                    f"the run ends after {run.time:.3g} s ({run.ending}), before its last twin "
+                    f"starts at {starts[-1]:.3g} s: a longer run is needed"
+                )
             others.append((run.twin(distance), run.time))
             if progress is not None:
                 progress(0.5 * run.time / end)
@@ -237,6 +242,12 @@ def lyapunov(
         reference = Orbit.of_trace(run.trace, checked)
         peaks = run.records("slips")
     _advance_all(others, span, executor, progress)
+    windows = min(len(other.trace) for other, _ in others) // window
+    if windows < MIN_WINDOWS:
+        raise RunError(
+            f"{windows} windows of {window * checked.output_interval:.3g} s are too few: a longer "
+            "run.duration is needed"
+        )
     results = []
     for other, start in others:
         times, distances = transverse_distances(
@@ -244,11 +255,6 @@ def lyapunov(
         )
         results.append((times - start, distances))
     windows = min(len(times) for times, _ in results)
-    if windows < MIN_WINDOWS:
-        raise RunError(
-            f"{windows} windows of {window * checked.output_interval:.3g} s are too few: a longer "
-            "run.duration is needed"
-        )
     times = np.stack([one[0][:windows] for one in results])
     distances = np.stack([one[1][:windows] for one in results])
     is_discrete = checked.contact_kind.is_discrete

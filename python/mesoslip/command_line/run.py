@@ -21,7 +21,7 @@ from mesoslip.command_line.options import (
     workers_option,
 )
 from mesoslip.command_line.progress import progress_shown, say
-from mesoslip.errors import FileError, MesoslipError
+from mesoslip.errors import FileError, MesoslipError, NoMemoryError
 from mesoslip.execution.stop import Stop, stopped_by_signals
 
 if TYPE_CHECKING:
@@ -96,14 +96,22 @@ def run(
         Checkpoint(folder, checked, interval=interval, resume=resume, report=report) as checkpoint,
         stopped_by_signals() as stop,
     ):
-        with progress_shown(quiet) as progress:
-            results = run_realizations(
-                checked,
-                executor=executor_of(workers, scheduler),
-                progress=progress,
-                stop=stop,
-                checkpoint=checkpoint,
-            )
+        try:
+            with progress_shown(quiet) as progress:
+                results = run_realizations(
+                    checked,
+                    executor=executor_of(workers, scheduler),
+                    progress=progress,
+                    stop=stop,
+                    checkpoint=checkpoint,
+                )
+        except NoMemoryError as error:
+            if not checkpoint.is_written:
+                raise
+            raise NoMemoryError(
+                f"{error}; what was computed is in {folder}: the same command with --resume "
+                "continues, where there is more memory"
+            ) from error
         if not results.complete:
             raise typer.Exit(_keep(results, path, stop, checkpoint))
         try:

@@ -306,15 +306,24 @@ class Config(Table):
         target = self.run.stops.displacement
         if target is None or self.drive.force_rate is not None or not self.spring_stiffness:
             return None
-        length = math.fsum(part.path_length for part in self.drive_parts)
+        reached = self._drive_reach(math.copysign(1, target))
         # A slip overshoots the equilibrium of the spring by at most the stretch of the spring.
         overshoot = self.contacts.static_force / self.spring_stiffness
-        if not length + overshoot < abs(target):
+        if not reached + overshoot < abs(target):
             return None
+        moves = f"moves {with_unit(reached, 'm')}" if reached else "does not move"
         return (
-            f"run.stop.displacement = {with_unit(target, 'm')} is out of reach: the drive moves "
-            f"{with_unit(length, 'm')} in the run"
+            f"run.stop.displacement = {with_unit(target, 'm')} is out of reach: the drive {moves} "
+            "in this direction in the run"
         )
+
+    def _drive_reach(self, direction: float) -> float:
+        """Largest displacement of the drive in a direction, 1 or -1 [m]."""
+        reach = place = 0.0
+        for part in self.drive_parts:
+            farthest, end = part.displacements(direction)
+            reach, place = max(reach, place + farthest), place + end
+        return reach
 
     @property
     def output_interval(self) -> float:

@@ -77,6 +77,16 @@ class DrivePart(NamedTuple):
             return 0.5 * abs(start + end) * time
         return 0.5 * time * (start**2 + end**2) / (abs(start) + abs(end))
 
+    def displacements(self, direction: float) -> tuple[float, float]:
+        """Largest displacement in a direction, 1 or -1, and that at its end [m]."""
+        start, change = direction * self.start_velocity, direction * self.end_velocity
+        change -= start
+        end = (start + 0.5 * change) * self.duration
+        # A part that turns back is farthest where it stands.
+        turns = start > 0 > start + change
+        farthest = -0.5 * start**2 / change * self.duration if turns else max(0.0, end)
+        return farthest, end
+
     def time_for(self, path_length: float) -> float:
         """Time that a path length takes, at most the duration of the part [s]."""
         if self.start_velocity == self.end_velocity:

@@ -63,4 +63,4 @@ def text_of(path: Path, kind: str, max_bytes: int = MAX_BYTES) -> str:
     except UnicodeDecodeError as error:
         raise FileError(f"{path}: is not {kind} (text in UTF-8): {error.reason}") from None
     except ValueError as error:
-        raise FileError(f"{path!r}: is not the name of a file: {error}") from None
+        raise FileError(f"{shown(path)}: is not the name of a file: {error}") from None

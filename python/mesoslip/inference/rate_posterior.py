@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from mesoslip.analysis.rate_and_state import (
     Fit,
+    Noise,
     NoiseModel,
     Record,
     estimated_noise,
@@ -59,11 +60,20 @@ class RatePosterior:
     """Draws on the unit cube of the prior, shape (chains, draws, parameters)."""
     is_preferred: bool
     """Whether the record prefers the law to the others."""
+    noise: Noise
+    """The noise about the least squares of this law, which may not be the best one."""
 
     @cached_property
     def values(self) -> Array:
         """Draws in SI, shape (chains, draws, parameters)."""
         return self.prior.values(self.chains)
+
+    @property
+    def noise_by_squares(self) -> tuple[float, float, float]:
+        """Values of `NOISE` about the least squares; NaN where the noise is known."""
+        if self.fit.noise.is_known:
+            return (math.nan,) * 3
+        return self.noise.deviation * self.fit.law.scale, self.noise.share, self.noise.time
 
     @property
     def draws(self) -> Array:
@@ -141,7 +151,10 @@ def sample_laws(
             draws=-(-samples // CHAINS),
             after_step=count_step,
         )
-        found.append(RatePosterior(fits[name], density.prior, chains, name == preferred))
+        is_preferred = name == preferred
+        found.append(
+            RatePosterior(fits[name], density.prior, chains, is_preferred, density.own_noise)
+        )
     return found
 
 
@@ -167,6 +180,12 @@ class Density:
             ratio = fit.value("slip_distance2") / fit.value("slip_distance")
             self.sign = 1.0 if ratio >= 1 else -1.0
 
+    @cached_property
+    def own_noise(self) -> Noise:
+        """The noise about this law, which may not be the best one."""
+        law, at = self.law, self.fit.at
+        return estimated_noise(law.points, law.residuals(at), law.jacobian(at))
+
     def __call__(self, unit: Array) -> Array:
         """The logarithm at points of shape (points, parameters), up to a constant."""
         law, values = self.law, self.prior.values(unit)
@@ -190,8 +209,7 @@ class Density:
         parameters)."""
         fit, size = self.fit, len(self.law.names)
         low, high = fit.law.bounds()
-        # That about this law, which may not be the best one.
-        noise = estimated_noise(fit.law.points, fit.law.residuals(fit.at), fit.law.jacobian(fit.at))
+        noise = self.own_noise
         time = noise.time if noise.time > 0 else math.sqrt(math.prod(self.noise.times))
         for spread in SPREADS:
             away = rng.multivariate_normal(np.zeros(size), fit.covariance, STARTS, method="svd")

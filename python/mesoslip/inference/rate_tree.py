@@ -265,10 +265,7 @@ def _parameters(one: RatePosterior, unit: str) -> xr.Dataset:
     place = prior.keys.index("stiffness" if "stiffness" in prior.keys else NOISE[0])
     names = [*prior.keys[:place], "a_minus_b", *prior.keys[place:]]
     known = {each.key: each for each in prior.free}
-    by_squares = (fit.noise.deviation * fit.law.scale, fit.noise.share, fit.noise.time)
-    noise = dict(zip(NOISE, by_squares, strict=True))
-    if fit.noise.is_known:
-        noise = dict.fromkeys(NOISE, math.nan)
+    noise = dict(zip(NOISE, one.noise_by_squares, strict=True))
     shrunk = dict(zip(prior.keys, shrinkage(one.draws), strict=True))
     rhat = dict(zip(prior.keys, r_hat(one.chains), strict=True))
 

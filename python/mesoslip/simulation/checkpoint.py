@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 
 from mesoslip import _build
 from mesoslip.configuration.differences import by_dotted_key
-from mesoslip.errors import FileError
+from mesoslip.errors import FileError, NoMemoryError
 from mesoslip.execution.store import Folder
 from mesoslip.memory_limit import is_memory_short
 from mesoslip.simulation.memory import free_memory
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
 
 # Version of the files' content; only the program that started a run resumes it.
-FORMAT = 2
+FORMAT = 3
 
 # Wall time between two checkpoints [s].
 INTERVAL = 60.0
@@ -52,6 +52,11 @@ RETRY_SECONDS = 10.0
 # Writing rows twice, and reading them, takes a tenth of a run with fine traces.
 MAX_WAITING_BYTES = 512e6
 MAX_WAITING_IF_SCARCE = 64e6
+
+ADVICE = (
+    "; without --resume the run starts from the beginning, and with another output (-o) this "
+    "checkpoint is kept"
+)
 
 STATE, PREVIOUS = "state.npz", "state.previous.npz"
 DAMAGED = "damaged."
@@ -146,16 +151,20 @@ class Checkpoint:
             epoch, _ = self._saved.get(one.number, (-1, None))
             is_over = one.finished
             saved = one.save() if epoch < self._epoch and not is_over else None
-            waiting = sum(rows.waiting_bytes for _, rows in one.waiting)
             with self._lock:
-                self._waiting_bytes += waiting - self._waiting.get(one.number, 0)
-                self._waiting[one.number] = waiting
-                self._grown[one.number] = one
+                self._count_waiting(one)
                 if is_over:
                     self._over[one.number] = one
                     self._saved.pop(one.number, None)
                 elif saved is not None:
                     self._saved[one.number] = (self._epoch, saved)
+
+    def _count_waiting(self, one: Realization) -> None:
+        """Note that a realization has rows in memory."""
+        waiting = sum(rows.waiting_bytes for _, rows in one.waiting)
+        self._waiting_bytes += waiting - self._waiting.get(one.number, 0)
+        self._waiting[one.number] = waiting
+        self._grown[one.number] = one
 
     # Called by the main thread.
 
@@ -175,15 +184,22 @@ class Checkpoint:
                 grown = list(self._grown.values())
             self._attempt(lambda: self._flush(grown))
 
+    @property
+    def is_written(self) -> bool:
+        """Whether the folder has a state."""
+        return (self.folder / STATE).exists()
+
     def write(self, realizations: Sequence[Realization]) -> bool:
-        """Write a checkpoint of a run that is not advancing; returns whether that succeeded."""
+        """Write a checkpoint of a run that is not advancing; returns whether that succeeded. Of
+        what failed the latest state before is kept."""
         self._epoch += 1
         for one in realizations:
             if one.finished:
                 self._over[one.number] = one
                 self._saved.pop(one.number, None)
-            elif one.advances > 0:
-                self._saved[one.number] = (self._epoch, one.save())
+            elif one.advances > 0 and not one.has_failed:
+                with suppress(MemoryError, NoMemoryError):
+                    self._saved[one.number] = (self._epoch, one.save())
         return self._write(realizations)
 
     def restore(self, realizations: Sequence[Realization]) -> float:
@@ -246,10 +262,13 @@ class Checkpoint:
         try:
             self._files.lock()
             action()
-        except OSError as error:
+        except (OSError, MemoryError) as error:
             if not self._is_failing:
+                reason = "not enough memory"
+                if isinstance(error, OSError):
+                    reason = error.strerror or str(error)
                 self._report(
-                    f"{self.folder}: the checkpoint cannot be written: {error.strerror or error}; "
+                    f"{self.folder}: the checkpoint cannot be written: {reason}; "
                     "the run continues, and tries again later"
                 )
             self._is_failing = True
@@ -268,6 +287,17 @@ class Checkpoint:
             for table, rows in one.waiting:
                 if rows.waiting_bytes:
                     waiting.setdefault(table, []).append((one, rows))
+        try:
+            self._append(waiting)
+        except BaseException:
+            # What is in no file still waits.
+            with self._lock:
+                for one in realizations:
+                    self._count_waiting(one)
+            raise
+
+    def _append(self, waiting: Mapping[str, Sequence[tuple[Realization, Rows]]]) -> None:
+        """Append rows by table to the files, each table wholly or not at all."""
         for table, all_rows in waiting.items():
             place = self._sizes[table]
             appended: list[tuple[Rows, list[Stored | None]]] = []
@@ -325,26 +355,27 @@ class Checkpoint:
             "configuration": self._config.to_toml(),
             "wall_seconds": self._earlier_seconds + time.perf_counter() - self._start,
         }
+        arrays["header"] = np.array(json.dumps(header))
         with self._files.written(STATE, keep=PREVIOUS) as file:
-            np.savez(file, header=np.array(json.dumps(header)), **arrays)
+            np.savez(file, checksum=_checksum(arrays), **arrays)
 
     def _read(self, path: Path, realizations: Sequence[Realization]) -> float:
-        """Restore realizations from a state, unless it is damaged or `_compare` refuses it."""
+        """Restore realizations from a state, unless it is damaged, or of another program
+        or configuration."""
         data = self._content(path.name)
         try:
             with np.load(io.BytesIO(data), allow_pickle=False) as file:
-                header = json.loads(str(file["header"]))
-                arrays = {name: file[name] for name in file.files if name != "header"}
+                arrays = {name: file[name] for name in file.files}
+            header = dict(json.loads(str(arrays["header"])))
+            checksum = int(arrays.pop("checksum", -1))
         # The libraries do not specify the errors of a damaged archive.
         except Exception as error:
             raise DamagedError(str(error) or type(error).__name__) from error
-        self._compare(header)
-        if missing := {f"pieces.{table}" for table in TABLES} - arrays.keys():
-            raise DamagedError(f"without {min(missing)}")
-        try:
-            states = from_arrays(arrays)
-        except (LookupError, TypeError, ValueError) as error:
-            raise DamagedError(str(error)) from error
+        self._compare_programs(header)
+        if checksum != _checksum(arrays):
+            raise DamagedError("it differs from what the run wrote")
+        self._compare_configurations(header["configuration"])
+        states = from_arrays(arrays)
         sizes = dict.fromkeys(TABLES, 0)
         tables: dict[int, dict[str, Rows]] = {number: {} for number in states}
         for table in TABLES:
@@ -394,24 +425,35 @@ class Checkpoint:
         except OSError as error:
             raise _not_read(self.folder / name, error) from error
 
-    def _compare(self, header: dict[str, Any]) -> None:
-        """Refuse a state of another configuration or program."""
-        advice = (
-            "; without --resume the run starts from the beginning, and with another output (-o) "
-            "this checkpoint is kept"
-        )
+    def _compare_programs(self, header: dict[str, Any]) -> None:
+        """Refuse a state of another program."""
         for name, value in self._program.items():
             if header.get(name) != value:
                 raise FileError(
                     f"{self.folder}: the checkpoint was made with {name} {header.get(name)} of "
-                    f"mesoslip, not {value}: only the same program resumes it to the bit" + advice
+                    f"mesoslip, not {value}: only the same program resumes it to the bit" + ADVICE
                 )
-        if header["configuration"] != self._config.to_toml():
+
+    def _compare_configurations(self, configuration: str) -> None:
+        """Refuse a state of another configuration."""
+        own = self._config.to_toml()
+        if configuration != own:
             raise FileError(
                 f"{self.folder}: the checkpoint is of another configuration: "
-                + _difference(header["configuration"], self._config.to_toml())
-                + advice
+                + _difference(configuration, own)
+                + ADVICE
             )
+
+
+def _checksum(arrays: Mapping[str, NDArray[Any]]) -> int:
+    """A checksum of arrays with their names, types and shapes."""
+    found = 0
+    for name, values in sorted(arrays.items()):
+        kind = f"{name} {values.dtype.str} {values.shape}"
+        found = zlib.crc32(
+            np.ascontiguousarray(values).view(np.uint8).data, zlib.crc32(kind.encode(), found)
+        )
+    return found
 
 
 def _first_rows(pieces: array[int], counts: Mapping[int, int]) -> NDArray[np.int64]:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from mesoslip import _core
 from mesoslip.configuration.kernel_parameters import Named, Parameters, named, padded
-from mesoslip.errors import RunError
+from mesoslip.errors import NoMemoryError, RunError
 from mesoslip.memory_limit import RESERVE, is_memory_short
 
 Array = NDArray[np.float64]
@@ -20,6 +20,8 @@ Words = NDArray[np.int64]
 
 # Maximum number of names in a list.
 MAX_NAMES = 64
+# Status of a kernel without enough memory (fortran/numerics/errors.f90).
+NO_MEMORY = 2
 # Room for the numbers in all rows of short realizations.
 SHORT_NUMBERS = 2**18
 
@@ -54,14 +56,15 @@ def checked(results: Any) -> tuple[Any, ...]:
     """Results of a kernel without its status and message; raises a `RunError` if it failed."""
     *values, status, message = results
     if status != 0:
-        raise RunError(message.decode().strip())
+        kind = NoMemoryError if status == NO_MEMORY else RunError
+        raise kind(message.decode().strip())
     return tuple(values)
 
 
 def check_reserve() -> None:
-    """Raise a `RunError` if there is hardly any memory."""
+    """Raise a `NoMemoryError` if there is hardly any memory."""
     if is_memory_short(RESERVE):
-        raise RunError("there is not enough memory for a simulation")
+        raise NoMemoryError("there is not enough memory for a simulation")
 
 
 class Kernel:

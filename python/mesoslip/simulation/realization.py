@@ -49,9 +49,11 @@ ENDINGS = {
 NO_ENERGY = np.full(len(ENERGY_COLUMNS), np.nan)
 NO_ENERGY.flags.writeable = False
 
-# Wall time of a segment, after which progress and signals are checked [s]; work of the first one.
+# Wall time of a segment, after which progress and signals are checked [s]; work of the first one,
+# of which populations with many heights take 60 µs each; work of short realizations.
 SEGMENT_SECONDS = 0.25
-SEGMENT_WORK = 100_000.0
+FIRST_WORK = 2_000.0
+SHORT_WORK = 100_000.0
 # Work of estimating the errors over the whole work.
 COARSE_PART = 0.25
 # No bound on the advances or the work of a segment.
@@ -88,6 +90,7 @@ class Realization(Recorded):
             "_has_steps",
             "_is_discrete",
             "_after",
+            "_has_failed",
             "_start",
             "_energy",
             "_recorded",
@@ -140,6 +143,7 @@ class Realization(Recorded):
             self._lacks_errors = estimates_errors and after is None
             self.force_error = self.slip_time_error = math.nan
         self._after = after
+        self._has_failed = False
         self._start = START
         self._energy: Array | None = None
         self._recorded = tables_of(config)
@@ -147,7 +151,7 @@ class Realization(Recorded):
         self._setup: KernelSetup | None = None
         self._kernel: Kernel | None = None
         self._words: Words | None = None
-        self._work = SEGMENT_WORK
+        self._work = FIRST_WORK
         self._lock = threading.Lock()
 
     @classmethod
@@ -215,8 +219,11 @@ class Realization(Recorded):
             else:
                 kernel.advance(advances or ANY_NUMBER, work or float(ANY_NUMBER))
             self._take(kernel)
-        except RunError as error:
-            raise RunError(f"realization {self.number}: {error}") from None
+        except (RunError, MemoryError) as error:
+            self._has_failed = True
+            if isinstance(error, MemoryError):
+                raise
+            raise type(error)(f"realization {self.number}: {error}") from None
         seconds = time.perf_counter() - start
         self.kernel_seconds += seconds
         if advances is None and work is None:
@@ -247,7 +254,7 @@ class Realization(Recorded):
     def advance_to(self, time: float) -> None:
         """Advance until a time [s] is reached, or the run is over.
 
-        The run stops at the first event at or after the time, at most 500 intervals of the trace
+        The run stops at an event at or after the time, as a rule less than an interval of the trace
         later.
 
         Raises
@@ -256,11 +263,14 @@ class Realization(Recorded):
             If the kernel fails.
         """
         before, advances = self.time, 1
+        # Longest duration of an advance: those in a slip are much shorter than those before it.
+        longest = self.config.output_interval
         while not self.finished and self.time < time:
             self.advance(advances)
-            pace, before = self.time - before, self.time
-            # Half the remaining time at the present pace, so as not to pass the end.
-            wanted = 0.5 * (time - self.time) / pace * advances if pace > 0 else 2.0 * advances
+            longest = max(longest, (self.time - before) / advances)
+            before = self.time
+            # Half of what certainly does not pass the end.
+            wanted = 0.5 * (time - self.time) / longest
             advances = int(min(max(1.0, wanted), 2.0 * advances, MAX_ADVANCES))
 
     @property
@@ -287,7 +297,14 @@ class Realization(Recorded):
         distance
             Displacement of its drive ahead of this one's [m]; for sliders with inertia on a spring
             (`rigid`, `layered`).
+
+        Raises
+        ------
+        RunError
+            If the run is over.
         """
+        if self.ending:
+            raise RunError(f"realization {self.number}: the run is over, so it has no twin")
         saved = self.save()
         other = type(self)(self.config, self.number, estimates_errors=False)
         other._start = self._start
@@ -347,7 +364,7 @@ class Realization(Recorded):
                 [one.number for one in realizations],
                 first.config.contacts.initial,
                 first._recorded,
-                SEGMENT_WORK,
+                SHORT_WORK,
             )
         finally:
             kernel.close()
@@ -383,6 +400,11 @@ class Realization(Recorded):
     def is_open(self) -> bool:
         """Whether it has a kernel, which a thread may use."""
         return self._kernel is not None
+
+    @property
+    def has_failed(self) -> bool:
+        """Whether an advance failed, after which its state is not that of a run."""
+        return self._has_failed
 
     @property
     def finished(self) -> bool:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip.configuration.config import Config
-from mesoslip.errors import FileError, MesoslipError, RunError
+from mesoslip.errors import FileError, MesoslipError, NoMemoryError
 from mesoslip.execution.executors import Batches, Executor, ExecutorLike, as_executor, completed
 from mesoslip.execution.pool import PoolError, WorkerLostError
 from mesoslip.execution.stop import Stop, StopRequest
@@ -66,6 +66,10 @@ def run_realizations(
             with requested.on_interrupt():
                 run.compute(requested)
         except (PoolError, WorkerLostError):
+            raise
+        except NoMemoryError:
+            # With more memory it can be resumed.
+            has_failed = not any(one.advances and not one.has_failed for one in run.realizations)
             raise
         except MesoslipError:
             has_failed = True
@@ -121,7 +125,7 @@ class _Run:
                 try:
                     seconds = future.result()
                 except MemoryError:
-                    raise RunError(NO_MEMORY) from None
+                    raise NoMemoryError(NO_MEMORY) from None
                 batches.finished(len(batch), seconds)
                 self._done += sum(one.finished for one in batch)
                 self._under_way.difference_update(batch)

@@ -14,6 +14,7 @@ from scipy.interpolate import BPoly
 
 from mesoslip import _core
 from mesoslip.configuration.kernel_parameters import Parameters, named
+from mesoslip.execution.interruptible import interruptible
 from mesoslip.simulation.kernel import checked
 
 Array = NDArray[np.float64]
@@ -44,7 +45,7 @@ def solve_renewal(
     ``start`` of the first panel and ``width`` of each are relative to the mean breaking stretch.
     """
     point, breaks, slope, force, stiffness, pinned, mismatch = checked(
-        _core.force_curve(*named(parameters), start, width, panels, POINTS)
+        interruptible(_core.force_curve, *named(parameters), start, width, panels, POINTS)
     )
     edges: Array = start + width * np.arange(panels + 1, dtype=np.float64)
     return RenewalSolution(

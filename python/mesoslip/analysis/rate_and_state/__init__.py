@@ -1,7 +1,7 @@
 """Rate-and-state friction: laws fitted to records of runs and to measured traces."""
 
 from mesoslip.analysis.rate_and_state.law import LAWS, RateAndState
-from mesoslip.analysis.rate_and_state.noise import NoiseModel, estimated_noise, known_noise
+from mesoslip.analysis.rate_and_state.noise import Noise, NoiseModel, estimated_noise, known_noise
 from mesoslip.analysis.rate_and_state.points import (
     Loading,
     Points,
@@ -18,6 +18,7 @@ __all__ = [
     "MAX_MISFIT",
     "Fit",
     "Loading",
+    "Noise",
     "NoiseModel",
     "Points",
     "RateAndState",

@@ -16,6 +16,8 @@ Samples = NDArray[np.int64]
 # than the maximum.
 EVEN_POINTS, EARLY_POINTS = 60, 90
 MAX_POINTS = 600
+# Part of a force that rounding of its averages changes.
+ROUNDING = 1e-13
 # Logarithm of the velocity of a load point at rest.
 REST = -30.0
 
@@ -64,6 +66,11 @@ class Points:
     def force_range(self) -> float:
         """Range of the force."""
         return max(float(np.ptp(self.force)), 1e-300)
+
+    @property
+    def is_constant(self) -> bool:
+        """Whether the force does not change beyond rounding."""
+        return float(np.ptp(self.force)) <= ROUNDING * float(np.max(np.abs(self.force)))
 
     @property
     def max_velocity(self) -> float:

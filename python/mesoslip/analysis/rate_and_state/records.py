@@ -35,6 +35,7 @@ MAX_STAGES = 200
 # Slip distances of a run in the search, over the mean breaking stretch.
 MIN_STRETCHES, MAX_STRETCHES = 0.03, 3.0
 
+CONSTANT = "the force is constant, so that nothing evolves"
 NO_CHANGE = "no step and no hold after sliding at constant velocity: no data for a, b and D_c"
 STROKES = "goes back and forth: mesoslip strokes has friction, loops and stiffness"
 REVERSES = "the drive reverses: ln V is not defined"
@@ -66,7 +67,12 @@ def records_of(experiment: Experiment, *, free_stiffness: bool = False) -> list[
     """The record of a run, or of a measured trace those of all stages together, of each step and of
     each hold; or why there is none."""
     found = _of_trace(experiment) if experiment.is_measured else _of_run(experiment, free_stiffness)
-    if isinstance(found, str) or not free_stiffness:
+    if isinstance(found, str):
+        return found
+    found = [one for one in found if not one.points.is_constant]
+    if not found:
+        return CONSTANT
+    if not free_stiffness:
         return found
     return [replace(one, stiffness=math.nan) for one in found]
 

@@ -49,7 +49,7 @@ def check_file(path: Path) -> None:
     except OSError as error:
         raise FileError(f"{path}: cannot be read: {error.strerror}") from None
     except ValueError as error:
-        raise FileError(f"{path!r}: is not the name of a file: {error}") from None
+        raise FileError(f"{shown(path)}: is not the name of a file: {error}") from None
 
 
 def bytes_of(path: Path) -> bytes:

@@ -35,7 +35,7 @@ contains
 
       call take_contact_parameters(common, parameters, seed, realization, error)
       if (allocated(error)) return
-      if (parameters%has("blocks")) then
+      if (parameters%has("block_counts")) then
          call new_row(contacts, kind, common, parameters, error)
       else
          call new_contacts_of_kind(contacts, kind, common, parameters, error)
@@ -54,26 +54,27 @@ contains
       type(contact_row_type), allocatable :: row
       type(contact_parameters_type) :: own
       type(parameters_type) :: others
+      real(wp), allocatable :: counts(:)
       real(wp) :: spacing
-      integer :: blocks, block, stat
+      integer :: block, stat
 
-      call parameters%take("blocks", blocks, error)
+      call parameters%take("block_counts", counts, error)
       call parameters%take("block_spacing", spacing, error)
       if (allocated(error)) return
-      if (blocks < 1 .or. modulo(common%count, max(blocks, 1)) /= 0) then
-         call raise(error, status_invalid, "each block of a row has the same number of contacts")
+      if (size(counts) < 1 .or. any(counts < 1.0_wp) .or. nint(sum(counts)) /= common%count) then
+         call raise(error, status_invalid, "blocks need a contact each, all contacts together")
          return
       end if
       allocate (row)
-      allocate (row%block(blocks), stat=stat)
+      allocate (row%block(size(counts)), stat=stat)
       if (stat /= 0) then
          call raise(error, status_memory, "not enough memory for the contacts of the blocks")
          return
       end if
       row%parameters = common
-      do block = 1, blocks
+      do block = 1, size(counts)
          own = common
-         own%count = common%count / blocks
+         own%count = nint(counts(block))
          own%realization = block_key(common%realization, block)
          ! The blocks go along one track.
          own%strength%origin = common%strength%origin + (block - 1) * spacing

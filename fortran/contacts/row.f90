@@ -30,7 +30,7 @@ module mesoslip_contacts_row
    contains
       procedure :: initialize, law, offer, respond, shift_origin, elastic_energy, exchange, rebuild
       procedure :: individual_count, snapshot, records, gather
-      procedure, non_overridable :: add_counts, look_for_failure
+      procedure, non_overridable :: add_counts, counts, look_for_failure
    end type contact_row_type
 
 contains
@@ -149,6 +149,18 @@ contains
       self%detached_count = self%detached_count + detached
       self%breaks = self%breaks + breaks
    end subroutine add_counts
+
+   !> Numbers of contacts of the blocks.
+   pure function counts(self)
+      class(contact_row_type), intent(in) :: self
+      integer :: counts(size(self%block))
+
+      integer :: block
+
+      do block = 1, size(counts)
+         counts(block) = self%block(block)%contacts%parameters%count
+      end do
+   end function counts
 
    !> Take over the failure of a block.
    subroutine look_for_failure(self)

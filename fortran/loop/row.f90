@@ -27,7 +27,7 @@ contains
       class(row_slider_type), intent(inout) :: slider
       class(contact_row_type), intent(inout) :: contacts
 
-      real(wp) :: springs
+      real(wp) :: springs, softest
       integer :: block
 
       if (size(contacts%block) /= slider%blocks) then
@@ -35,11 +35,12 @@ contains
          return
       end if
       associate (parameters => contacts%parameters)
-         slider%pinned_stiffness = parameters%stiffness * (parameters%count / slider%blocks)
-         springs = slider%pinned_stiffness + 2.0_wp * slider%neighbour_spring &
+         slider%pinned_stiffness = parameters%stiffness * maxval(contacts%counts())
+         softest = parameters%stiffness * minval(contacts%counts())
+         springs = softest + 2.0_wp * slider%neighbour_spring &
             & + slider%edge_stiffness + slider%top_stiffness / slider%blocks
          slider%tiny_displacement = parameters%static_force / parameters%stiffness &
-            & * min(tiny_stretch, tiny_bend * slider%pinned_stiffness / springs)
+            & * min(tiny_stretch, tiny_bend * softest / springs)
       end associate
       slider%has_clocks = contacts%has_clocks
       do block = 1, slider%blocks
@@ -184,19 +185,19 @@ contains
       class(row_slider_type), intent(in) :: slider
       class(contact_row_type), intent(inout) :: contacts
 
-      real(wp) :: drive_velocity, contact_count
+      real(wp) :: drive_velocity, count
       integer :: block
 
       drive_velocity = slider%drive%rate_at(slider%time)
-      contact_count = real(contacts%parameters%count / slider%blocks, wp)
       do block = 1, slider%blocks
          associate (own => contacts%block(block))
+            count = real(own%contacts%parameters%count, wp)
             if (contacts%keeps_offers) own%pose = slider%block_pose(block)
             call state%ruptures%note_motion(block, slider%time, slider%drive%direction &
                & * (own%pose%velocity - drive_velocity), slider%origin + own%pose%displacement, &
                & slider%block_force(block), own%contacts%breaks, &
-               & contact_count - own%contacts%detached_count, &
-               & 1.0_wp - own%contacts%detached_count / contact_count)
+               & count - own%contacts%detached_count, &
+               & 1.0_wp - own%contacts%detached_count / count)
          end associate
       end do
    end subroutine note_blocks

@@ -36,7 +36,7 @@ BLOCKS, SPACING, BLOCK_TIME, QUIET, STRENGTH = 10, 0.5, 1e-3, 0.1, 2.0
 
 def finder() -> FrontFinder:
     return FrontFinder(
-        BLOCKS, SPACING, BLOCK_TIME, QUIET, lambda times: np.full(times.shape, STRENGTH)
+        BLOCKS, SPACING, BLOCK_TIME, QUIET, lambda _, times: np.full(times.shape, STRENGTH)
     )
 
 

@@ -323,42 +323,31 @@ def static_balance(config: Config, residual: float) -> Array | None:
     """Force of the spring at the edge [N] at which a rupture of the first 0, 1, ... blocks goes on.
 
     The ruptured blocks bear ``residual`` times their static force. The pinned blocks ahead bear the
-    rest, the first of them its static force F_s/N_b, the others less: displacements are
-    proportional to cosh(κ (N_b - j + 1/2)) with 2 (cosh κ - 1) = k'/k_b, as in a row with a free
-    end. So F(n)/F_s = (residual n + Σ_{j>n} cosh(κ (N_b - j + 1/2))/cosh(κ (N_b - n - 1/2)))/N_b;
-    for Λ ≫ a it is residual ℓ/L + Λ/L tanh((L - ℓ)/Λ). None with springs from above.
+    rest, the first of them its static force, the others less: the row ahead, with its free end,
+    resists as S_j = k'_j + 1/(1/k_b + 1/S_{j+1}). Where all blocks bear the same and Λ ≫ a,
+    F(n)/F_s = residual ℓ/L + Λ/L tanh((L - ℓ)/Λ). None with springs from above.
     """
     slider, contacts = config.slider, config.contacts
     blocks = slider.block_count
     if blocks < 2 or slider.springs_from_above:
         return None
-    ratio = contacts.stiffness / blocks / slider.neighbour_spring
-    decay = 2 * np.arcsinh(np.sqrt(ratio) / 2)
-    from_end = np.arange(blocks)[::-1] + 0.5
-    # cosh(κ x)/cosh(κ y) without overflow.
-    forces = [
-        residual * n
-        + float(
-            np.sum(
-                np.exp(decay * (from_end[n:] - from_end[n]))
-                * (1 + np.exp(-2 * decay * from_end[n:]))
-                / (1 + np.exp(-2 * decay * from_end[n]))
-            )
-        )
-        for n in range(blocks)
-    ]
-    return contacts.static_force / blocks * np.array(forces)
+    pinned = contacts.stiffness / blocks * config.block_shares
+    resistance = pinned.copy()
+    for block in range(blocks - 2, -1, -1):
+        resistance[block] += 1 / (1 / slider.neighbour_spring + 1 / resistance[block + 1])
+    strengths = config.block_strengths
+    behind: Array = residual * (np.cumsum(strengths) - strengths)
+    return behind + strengths * resistance / pinned
 
 
 def residual_of(tree: Tree, realization: int | None = None) -> float:
     """Mean force on the contacts after ruptures over the static force; NaN without ruptures."""
     config, data = config_of(tree), group_of(tree, "ruptures")
     after = np.asarray(data["force_after"].values)
+    ratios = after / config.block_strengths[np.asarray(data["block_number"].values) - 1]
     if realization is not None:
-        after = after[np.asarray(data["realization_index"].values) == realization]
-    if not after.size:
-        return float("nan")
-    return float(after.mean() * config.slider.block_count / config.contacts.static_force)
+        ratios = ratios[np.asarray(data["realization_index"].values) == realization]
+    return float(ratios.mean()) if ratios.size else float("nan")
 
 
 def fronts(output: OutputLike) -> xr.DataTree:

@@ -11,6 +11,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Self
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, PrivateAttr, ValidationError, model_validator
 from pydantic_core import PydanticCustomError
 
@@ -145,6 +147,9 @@ class Config(Table):
         complaints = [
             *checks.drive_problems(self),
             *self.slider.problems(self),
+            *self.pressing.block_problems(
+                self.contact_kind.site_count(self.contacts), self.slider.block_count
+            ),
             *self.contact_kind.problems(self, self.given_contact_keys),
             *checks.curve_problems(self),
         ]
@@ -292,6 +297,17 @@ class Config(Table):
     def pressing(self) -> Load:
         """The normal load, also where none is given."""
         return self.normal_load or UNLOADED
+
+    @cached_property
+    def block_shares(self) -> NDArray[np.float64]:
+        """Contacts, strength and normal force of each block of the slider over their mean."""
+        sites, blocks = self.contact_kind.site_count(self.contacts), self.slider.block_count
+        return self.pressing.block_counts(sites, blocks) / (sites / max(blocks, 1))
+
+    @property
+    def block_strengths(self) -> NDArray[np.float64]:
+        """Static force of each block at the reference load [N]."""
+        return self.contacts.static_force / max(self.slider.block_count, 1) * self.block_shares
 
     @property
     def notes(self) -> list[str]:

@@ -28,6 +28,7 @@ EXCLUSIVE = {
 FILES = (
     ("drive", "history", "file"),
     ("load", "history", "file"),
+    ("load", "profile"),
     ("contacts", "threshold", "file"),
 )
 
@@ -134,12 +135,12 @@ def parse_toml(text: str, source: str) -> dict[str, Any]:
 
 
 def check_no_files(tables: Mapping[str, Any], source: str, prefix: str = "") -> None:
-    """Refuse a key ``file`` in the tables of an output, which contain the data themselves."""
+    """Refuse names of files in the tables of an output, which contain the data themselves."""
     for key, value in tables.items():
         where = f"{prefix}{key}"
         if isinstance(value, Mapping):
             check_no_files(value, source, f"{where}.")
-        elif key == "file":
+        elif key == "file" or (isinstance(value, str) and tuple(where.split(".")) in FILES):
             raise ConfigError([Problem(source, where, "an output must not name a file", value)])
 
 

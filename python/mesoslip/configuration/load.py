@@ -15,15 +15,25 @@ from typing import Annotated, Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
-from mesoslip.configuration.columns import Quantity
+from mesoslip.configuration.columns import (
+    HEADER,
+    FoundColumn,
+    Quantity,
+    cells_of,
+    values_of,
+)
 from mesoslip.configuration.drive import MAX_PARTS, read_history
 from mesoslip.configuration.kernel_parameters import Parameters
+from mesoslip.configuration.reading import text_of
 from mesoslip.configuration.table import (
     Angle,
+    Complaint,
+    Complaints,
     Force,
     MeasuredTime,
+    Number,
     Rate,
     SignedForce,
     Table,
@@ -41,6 +51,8 @@ COLUMNS = {
     "time": Quantity("time", "s", "time [s]"),
     "normal_force": Quantity("normal_force", "N", "normal force [N]"),
 }
+# Column of a profile along an interface.
+PROFILE_COLUMN = "normal_force"
 # End of the last part, which has none.
 NEVER = 1e300
 # Part of a site that rounding may add.
@@ -154,6 +166,28 @@ class Load(Table):
     """A vibrating load."""
     history: LoadHistory | None = None
     """A measured history; the last force holds until the run ends."""
+    profile: tuple[Number, ...] | None = None
+    """Normal forces of the blocks of an interface, from the edge on, of which only the ratios
+    matter; or a CSV file with a column `normal_force`, relative to the configuration. Outputs keep
+    the numbers, not the name of the file."""
+
+    @field_validator("profile", mode="before")
+    @classmethod
+    def _read_profile(cls, value: Any) -> Any:
+        if not isinstance(value, str):
+            return value
+        try:
+            return read_profile(Path(value))
+        except FileError as error:
+            raise ValueError(str(error)) from None
+
+    @field_validator("profile")
+    @classmethod
+    def _is_positive(cls, value: tuple[float, ...] | None) -> tuple[float, ...] | None:
+        for block, one in enumerate(value or (), 1):
+            if not one > 0:
+                raise ValueError(f"must be positive; block {block} has {one:g}")
+        return value
 
     @model_validator(mode="after")
     def _is_one_load(self) -> Self:
@@ -209,6 +243,11 @@ class Load(Table):
         return self.max_force != self.min_force
 
     @property
+    def is_uniform(self) -> bool:
+        """Whether all blocks of an interface bear the same."""
+        return len(set(self.profile or (1.0,))) == 1
+
+    @property
     def acts(self) -> bool:
         """Whether contacts are not those without a load: it differs from L_0 at some time."""
         return self.varies or self.max_force != self.normal_force
@@ -221,6 +260,35 @@ class Load(Table):
     def site_count(self, count: int) -> int:
         """Number of contacts at the maximum of the load, given that at L_0."""
         return max(1, math.ceil(count * (self.max_force / self.normal_force) - TINY_SITE))
+
+    def block_counts(self, sites: int, blocks: int) -> NDArray[np.int64]:
+        """Number of contacts of each block, as its share of the load, rounded so that they add up
+        to all ``sites``."""
+        shares = self.profile or (1.0,) * blocks
+        parts = sites * np.array(shares) / math.fsum(shares)
+        counts = np.floor(parts + TINY_SITE).astype(np.int64)
+        missing = sites - int(counts.sum())
+        counts[np.argsort(counts - parts, kind="stable")[:missing]] += 1
+        return counts
+
+    def block_problems(self, sites: int, blocks: int) -> Complaints:
+        """Errors of the profile of a slider with a number of blocks, 0 for other kinds."""
+        if self.profile is None:
+            return
+        if not blocks:
+            yield Complaint("load.profile", 'is for slider.kind = "interface" only')
+        elif len(self.profile) != blocks:
+            yield Complaint(
+                "load.profile",
+                f"has {len(self.profile)} values, and slider.blocks = {blocks}: give one for each "
+                "block",
+            )
+        elif not (counts := self.block_counts(sites, blocks)).all():
+            yield Complaint(
+                "load.profile",
+                f"leaves block {int(np.argmin(counts)) + 1} without a contact: give more of them "
+                "by contacts.count",
+            )
 
     def kernel_parameters(self, count: int) -> Parameters:
         """Parameters of the load in the kernel, as shares of the sites; none if it is constant."""
@@ -272,6 +340,24 @@ class Load(Table):
         part = 1 - (ends[number] - times) / durations[number]
         force: Array = first[number] + np.clip(part, 0, 1) * (last[number] - first[number])
         return np.where(np.isnan(times), np.nan, force)
+
+
+def read_profile(path: Path) -> list[float]:
+    """Normal forces of the blocks in a file, a table with a column of them; the size of its unit
+    does not matter."""
+    cells = cells_of(text_of(path, "a profile of the load"), str(path))
+    names = [HEADER.fullmatch(one) for one in cells.first]
+    places = [
+        place
+        for place, match in enumerate(names)
+        if match is not None and match["name"].strip().lower().replace(" ", "_") == PROFILE_COLUMN
+    ]
+    if not cells.has_header or len(places) != 1:
+        raise FileError(
+            f"{path}: the header must name one column {PROFILE_COLUMN}, such as 'normal_force [N]'"
+        )
+    found = {"normal force": FoundColumn(places[0], 1.0)}
+    return values_of(cells, cells.first, found)["normal force"]
 
 
 class Unloaded(Load):

@@ -419,7 +419,7 @@ def _interface(tree: xr.DataTree, along: Scale, reached: float) -> Interface | N
         Axis("time", along),
         Axis("position", across),
     )
-    stress = (forces.T * (blocks / config.contacts.static_force)).astype(np.float32)
+    stress = (forces / config.block_strengths).T.astype(np.float32)
     return Interface(stress, reached / along.size, blocks * spacing / across.size, ruptures)
 
 

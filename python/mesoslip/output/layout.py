@@ -274,6 +274,17 @@ def _blocks(results: Results) -> GroupLayout:
 
         where = ("realization", "time", "block")
         group.add(name, where, has_gaps=has_gaps, table="blocks", pick=pick)
+    load = results.config.pressing
+    if load.is_known:
+        shares, times = results.config.block_shares / slider.block_count, column("trace", "time")
+
+        def pressed(rows: Array, owners: Array) -> Array:
+            return load.force_at(times(rows, owners))[:, None] * shares
+
+        if load.varies:
+            group.add("block_normal_force", where, has_gaps=has_gaps, table="trace", pick=pressed)
+        else:
+            group.add("block_normal_force", ("block",), values=load.max_force * shares)
     return GroupLayout({"block": slider.block_count}, group.entries, {})
 
 

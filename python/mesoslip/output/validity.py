@@ -31,7 +31,7 @@ NEEDS = {
     "stages": (("stage",), tuple(variables.STAGES)),
     "slip_traces": (("sample",), ("realization_index", "sample_time", *ROOT_NEEDS)),
     "avalanches": (("avalanche",), tuple(variables.AVALANCHES)[:6]),
-    "blocks": (("realization", "time", "block"), tuple(variables.BLOCKS)[2:]),
+    "blocks": (("realization", "time", "block"), tuple(variables.BLOCKS)[2:6]),
     "ruptures": (("rupture",), tuple(variables.RUPTURES)),
     "fronts": (("front",), tuple(variables.FRONTS)),
     "snapshots": (("snapshot",), tuple(variables.SNAPSHOTS)[:7]),

@@ -254,6 +254,7 @@ BLOCKS = Group(
     block_detached_contacts=Meaning(
         "1", "number of detached contacts of the block", np.int32, is_fractional=True
     ),
+    block_normal_force=Meaning("N", "normal force on the block"),
 )
 
 RUPTURES = Group(

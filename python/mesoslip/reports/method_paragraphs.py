@@ -286,6 +286,12 @@ def _contacts(config: Config, *, is_slow: bool = False) -> Iterator[str]:
     yield _lives(config, is_slow=is_slow or config.slider.ignores_delay)
     for key, feature in config.contact_features.items():
         yield feature_sentence(feature, key, config)
+    if not config.pressing.is_uniform:
+        shares = config.block_shares
+        yield (
+            f"Blocks bear {shares.min():.3g} to {shares.max():.3g} times the mean normal force of "
+            "all, with as many contacts."
+        )
 
 
 def _lives(config: Config, *, is_slow: bool) -> str:

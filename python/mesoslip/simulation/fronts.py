@@ -122,7 +122,7 @@ class FrontFinder:
     quiet_time
         Time without fast motion after which a slip is over [s].
     strength
-        Static force of a block [N] at times [s].
+        Static forces [N] of blocks, numbered from 1, at times [s].
     """
 
     def __init__(
@@ -131,7 +131,7 @@ class FrontFinder:
         spacing: float,
         block_time: float,
         quiet_time: float,
-        strength: Callable[[Array], Array],
+        strength: Callable[[NDArray[np.integer[Any]], Array], Array],
     ) -> None:
         self._blocks, self._spacing = blocks, spacing
         self._block_time, self._quiet_time = block_time, quiet_time
@@ -211,8 +211,8 @@ class FrontFinder:
         ]
         for direction, end in sides or [(1, basin.nucleus)]:
             own = [rows[place] for place in _between(basin.nucleus, end)]
-            numbers = piece[_between(basin.nucleus, end)].astype(float)
-            centers = (numbers - 0.5) * self._spacing
+            numbers = piece[_between(basin.nucleus, end)]
+            centers = (numbers.astype(float) - 0.5) * self._spacing
             # Two arms share the block of their nucleation; a single one has all of it.
             half = direction * 0.5 * self._spacing
             start = centers[0] - (half if len(sides) < 2 else 0.0)
@@ -235,7 +235,7 @@ class FrontFinder:
                 front_speed(times, centers),
                 float(np.sum(before - after)),
                 float(ARRESTS.index(arrest)),
-                float(np.mean(np.abs(before) / self._strength(starts))),
+                float(np.mean(np.abs(before) / self._strength(numbers, starts))),
             )
 
 

@@ -515,11 +515,11 @@ def front_finder(config: Config) -> FrontFinder | None:
     slider, load = config.slider, config.pressing
     if not slider.block_count:
         return None
-    force = config.contacts.static_force / slider.block_count / load.normal_force
+    strengths = config.block_strengths / load.normal_force
     return FrontFinder(
         slider.block_count,
         slider.block_spacing,
         slider.block_time,
         slider.quiet_time,
-        lambda times: force * load.force_at(times),
+        lambda blocks, times: strengths[blocks - 1] * load.force_at(times),
     )

@@ -83,6 +83,9 @@ class LinearStability(abc.ABC):
         contacts = config.contacts
         problems = [*self._problems(config), *steady_problems(config)]
         problems += stability_problems(config.slider)
+        if not config.pressing.is_uniform:
+            message = "has no theory of stability: blocks under unlike loads do not move together"
+            problems.append(Problem("", "load.profile", message))
         if config.slider.layer_count > MAX_LAYERS:
             message = f"linear stability is found for at most {MAX_LAYERS}"
             problems.append(Problem("", "slider.layers", message, config.slider.layer_count))

@@ -64,7 +64,7 @@ class SteadyFront:
     Raises
     ------
     ConfigError
-        With another slider, or a single block.
+        With another slider, a single block, or a profile of the load.
 
     Notes
     -----
@@ -78,6 +78,9 @@ class SteadyFront:
         if scales is None:
             message = 'fronts run along the blocks of slider.kind = "interface", two or more'
             raise ConfigError([Problem("", "slider.kind", message, config.slider.kind)])
+        if not config.pressing.is_uniform:
+            message = "a steady front needs the same strength of all blocks: leave it out"
+            raise ConfigError([Problem("", "load.profile", message)])
         self.sound_velocity = scales.sound_velocity
         self._contacts, self._top, self._edge = scales.contacts, scales.top, scales.edge
         self._drag, self._viscosity, self._damping = scales.drag, scales.viscosity, scales.damping

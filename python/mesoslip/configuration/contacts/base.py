@@ -38,7 +38,9 @@ class Block(Protocol):
     @property
     def jumps(self) -> bool: ...
     @property
-    def contact_parameters(self) -> Parameters: ...
+    def block_count(self) -> int: ...
+    @property
+    def block_spacing(self) -> float: ...
 
 
 class Setting(Protocol):
@@ -192,10 +194,22 @@ def common_parameters(config: Setting) -> Parameters:
         "newborn_width": contacts.newborn_width,
         "coupling": contacts.coupling,
         "reattach": int(contacts.reattach),
-        **config.slider.contact_parameters,
+        **_blocks(config),
         **contacts.threshold.kernel_parameters,
         **_kept(contacts),
         **_track(contacts),
+    }
+
+
+def _blocks(config: Setting) -> Parameters:
+    """Parameters of contacts on the blocks of a slider."""
+    load, blocks = config.pressing, config.slider.block_count
+    if not blocks:
+        return {}
+    counts = load.block_counts(load.site_count(config.contacts.count), blocks)
+    return {
+        "block_counts": tuple(counts.tolist()),
+        "block_spacing": config.slider.block_spacing,
     }
 
 

@@ -7,10 +7,13 @@ from abc import abstractmethod
 from collections.abc import Iterator
 from typing import ClassVar, NamedTuple, Protocol, TypeAlias
 
+import numpy as np
+from numpy.typing import NDArray
+
 from mesoslip.configuration.contacts.base import ContactKind
 from mesoslip.configuration.contacts.tables import Contacts
 from mesoslip.configuration.drive import Drive
-from mesoslip.configuration.kernel_parameters import Parameters
+from mesoslip.configuration.load import Load
 from mesoslip.configuration.run_tables import Output
 from mesoslip.configuration.table import Complaints, Table
 
@@ -44,6 +47,10 @@ class Setting(Protocol):
     def contacts(self) -> Contacts: ...
     @property
     def contact_kind(self) -> ContactKind: ...
+    @property
+    def pressing(self) -> Load: ...
+    @property
+    def block_shares(self) -> NDArray[np.float64]: ...
     @property
     def output(self) -> Output: ...
 
@@ -136,11 +143,6 @@ class SliderTable(Table):
     def block_time(self) -> float:
         """Time of sound over a block [s]."""
         return 0.0
-
-    @property
-    def contact_parameters(self) -> Parameters:
-        """Parameters that the kernel's contacts have of the slider."""
-        return {}
 
     @property
     def extra_traces(self) -> tuple[str, ...]:

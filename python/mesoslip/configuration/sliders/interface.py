@@ -7,7 +7,6 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from mesoslip.configuration.kernel_parameters import Parameters
 from mesoslip.configuration.sliders.base import Notes, Setting
 from mesoslip.configuration.sliders.inertial import (
     SLIP_VELOCITY_RATIO,
@@ -119,10 +118,6 @@ class InterfaceSlider(SetupDamping, InertialSlider):
     def block_count(self) -> int:
         return self.blocks
 
-    @property
-    def contact_parameters(self) -> Parameters:
-        return {"blocks": self.blocks, "block_spacing": self.block_spacing}
-
     def kernel_parameters(self, config: Setting) -> dict[str, float | str]:  # noqa: ARG002
         return {
             "blocks": self.blocks,
@@ -139,7 +134,7 @@ class InterfaceSlider(SetupDamping, InertialSlider):
             return super().slip_velocity(config)
         # A block that loses its static force moves with that over its impedance; a slip of all
         # blocks may be slower.
-        block = config.contacts.static_force / self.blocks
+        block = config.contacts.static_force / self.blocks * float(config.block_shares.min())
         impedance = self.block_mass * self.neighbour_frequency
         return SLIP_VELOCITY_RATIO * min(block / impedance, self.velocity_scale(config))
 
@@ -211,7 +206,7 @@ class InterfaceSlider(SetupDamping, InertialSlider):
                 f"{self.blocks * max(1, round(count / self.blocks))}",
                 count,
             )
-        elif sites % self.blocks:
+        elif sites % self.blocks and config.pressing.profile is None:
             yield Complaint(
                 "load",
                 f"at its maximum there are {sites} contacts, which must be a multiple of "

@@ -130,7 +130,7 @@ def _draw_detached(axes: Axes, tree: Tree, picture: Picture, horizontal: Horizon
     drawn = axes.pcolormesh(
         (times[samples] - horizontal.origin) / horizontal.scale.size,
         (np.arange(blocks) + 0.5) * picture.spacing / scale.size,
-        detached.T * blocks / config.contacts.count,
+        (detached / config.block_shares).T * blocks / config.contacts.count,
         cmap="cividis",
         vmin=0,
         vmax=1,
@@ -193,11 +193,10 @@ def movie(tree: Any, options: Options) -> Movie:
     places = (np.arange(blocks) + 0.5) * picture.spacing / length.size
     figure = canvas(None, (5.0, 5.0))
     panels = figure.subplots(3, 1, height_ratios=[1.3, 1, 1])
-    strength = config.contacts.static_force / blocks
     speed = scale_for(float(np.abs(velocity).max()) or 1.0, "m/s")
     lines = []
     for axes, values, label in (
-        (panels[0], force / strength, "stress/strength"),
+        (panels[0], force / config.block_strengths, "stress/strength"),
         (panels[1], velocity / speed.size, speed.label("velocity")),
     ):
         (line,) = axes.plot(places, values[0], color="black", linestyle="-")

@@ -29,7 +29,7 @@ def draw_panel(axes: Axes, tree: Tree, options: Options) -> None:
         values = np.asarray(force.isel(time=index).values)
         axes.plot(
             places,
-            values * blocks / config.contacts.static_force,
+            values / config.block_strengths,
             ".-",
             color=color,
             label=f"{word}, at {with_unit(float(times[index]), 's', 5)}",

@@ -52,10 +52,14 @@ class ContactTheory:
     def caveat(self) -> str:
         """What results leave out; empty if nothing."""
         load = self.config.pressing
-        if not load.acts:
-            return self.kind_caveat
-        given = f"computed at the constant normal force {with_unit(load.normal_force, 'N')}"
-        return ". ".join(one for one in (self.kind_caveat, given) if one)
+        given = [self.kind_caveat] if self.kind_caveat else []
+        if load.acts:
+            given.append(
+                f"computed at the constant normal force {with_unit(load.normal_force, 'N')}"
+            )
+        if not load.is_uniform:
+            given.append("computed for blocks that bear the same, not for load.profile")
+        return ". ".join(given)
 
     @property
     def depends_on_velocity(self) -> bool:

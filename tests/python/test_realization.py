@@ -5,6 +5,7 @@ from __future__ import annotations
 import doctest
 import gc
 import time
+from contextlib import suppress
 
 import numpy as np
 import pytest
@@ -220,6 +221,18 @@ def test_many_short_realizations_are_set_up_once_and_handed_over_in_batches(monk
     assert len(checked) == 1
     assert sum(map(len, submitted)) == 1000
     assert len(submitted) < 200
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, RuntimeError])
+def test_the_search_for_garbage_goes_on_whatever_ends_a_run(error, monkeypatch):
+    def fail(_: float) -> None:
+        raise error
+
+    monkeypatch.setattr(module, "MANY", 0)
+    config = Config.from_dict(klein_tables(run__realizations=3, **FEW))
+    with suppress(error):
+        run_realizations(config, executor=1, progress=fail)
+    assert gc.isenabled()
 
 
 def test_an_interrupted_run_counts_its_realizations():

@@ -170,6 +170,19 @@ def test_a_run_has_the_speed_and_the_prestress(drag, front_type, tolerance):
     assert FRONT_TYPES[int(found["front_type"])] == front_type
 
 
+def test_contacts_that_attach_again_are_refused():
+    with pytest.raises(ConfigError, match="contacts that attach again have no steady fronts"):
+        SteadyFront(Config.load(RUN).replace({"contacts.reattach": True}))
+
+
+def test_speeds_are_sought_between_limits():
+    theory = front(drag=1.0)
+    slow, fast = theory.stress_ratio([0.9e-4 * theory.sound_velocity, 99 * theory.sound_velocity])
+    assert np.isnan(slow)
+    assert np.isfinite(fast)
+    assert np.isnan(theory.speed(1 - 1e-9))
+
+
 def test_a_row_is_needed():
     message = re.escape('fronts run along the blocks of slider.kind = "interface", two or more')
     with pytest.raises(ConfigError, match=message):

@@ -191,9 +191,9 @@ def _collection_paused(is_wanted: bool) -> Iterator[None]:
     """Without searches for cyclic garbage, of which realizations make none: each would look through
     all of them."""
     pauses = is_wanted and gc.isenabled()
-    if pauses:
-        gc.disable()
     try:
+        if pauses:
+            gc.disable()
         yield
     finally:
         if pauses:

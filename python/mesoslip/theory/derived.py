@@ -78,8 +78,9 @@ def overview(config: Config, found: dict[str, Derived]) -> dict[str, Derived]:
         first["contact_breaks"] = Derived(
             config.contacts.count * length / life.value,
             "1",
-            "breaks in the run if it slides steadily; engine eq: 0.1 to 0.5 µs each for most "
-            "contacts",
+            "breaks of steady sliding along the whole drive, about the most there will be: fewer "
+            "while it loads, and where slips pass detached contacts; engine eq: 0.1 to 0.5 µs each "
+            "for most contacts",
         )
     return first
 

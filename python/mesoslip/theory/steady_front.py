@@ -64,7 +64,8 @@ class SteadyFront:
     Raises
     ------
     ConfigError
-        With another slider, a single block, or a profile of the load.
+        With another slider, a single block, a profile of the load, or contacts that attach again
+        (``contacts.reattach``).
 
     Notes
     -----
@@ -81,6 +82,9 @@ class SteadyFront:
         if not config.pressing.is_uniform:
             message = "a steady front needs the same strength of all blocks: leave it out"
             raise ConfigError([Problem("", "load.profile", message)])
+        if config.contacts.reattach:
+            message = "contacts that attach again have no steady fronts: set it to false"
+            raise ConfigError([Problem("", "contacts.reattach", message, True)])
         self.sound_velocity = scales.sound_velocity
         self._contacts, self._top, self._edge = scales.contacts, scales.top, scales.edge
         self._drag, self._viscosity, self._damping = scales.drag, scales.viscosity, scales.damping
@@ -112,7 +116,7 @@ class SteadyFront:
         -------
         ndarray
             Stresses on the contacts far ahead over their strength, of the shape of ``speed``; NaN
-            where no front is steady, and below c/10 000.
+            where no front is steady, and below c/10 000, beyond which nothing is computed.
         """
         with np.errstate(divide="ignore"):
             times = self.sound_velocity / np.asarray(speed, dtype=float)
@@ -131,7 +135,8 @@ class SteadyFront:
         Returns
         -------
         ndarray
-            Speeds [m/s], of the shape of ``stress_ratio``; NaN where no front is steady.
+            Speeds [m/s], of the shape of ``stress_ratio``; NaN where no front is steady, or none
+            between c/10 000 and 100 c, where they are sought.
         """
         ratios = np.asarray(stress_ratio, dtype=float)
         count = round(TIMES_PER_DECADE * math.log10(MAX_TIME / MIN_TIME)) + 1

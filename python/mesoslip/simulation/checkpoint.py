@@ -460,11 +460,16 @@ def _first_rows(pieces: array[int], counts: Mapping[int, int]) -> NDArray[np.int
     """The pieces of the first rows of realizations, given how many rows each has; shape (pieces,
     5), see `Checkpoint`."""
     found = np.array(pieces, dtype=np.int64).reshape(-1, 5)
-    remaining = dict(counts)
+    # Pieces of each realization one after another, in their order.
+    order = np.argsort(found[:, 0], kind="stable")
+    numbers, lengths = found[order][:, [0, 2]].T
+    first = np.flatnonzero(np.diff(numbers, prepend=-1))
+    pieces_of_each = np.diff(first, append=len(numbers))
+    before = np.cumsum(lengths) - lengths
+    before -= np.repeat(before[first], pieces_of_each)
+    wanted = np.array([counts.get(one, 0) for one in numbers[first].tolist()], dtype=np.int64)
     kept = np.zeros(len(found), dtype=bool)
-    for place, (number, length) in enumerate(found[:, [0, 2]].tolist()):
-        kept[place] = remaining.get(number, 0) > 0
-        remaining[number] = remaining.get(number, 0) - length
+    kept[order] = before < np.repeat(wanted, pieces_of_each)
     return found[kept]
 
 

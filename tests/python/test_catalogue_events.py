@@ -17,7 +17,7 @@ def test_b_value_of_a_complete_catalogue():
     """Aki's estimate by hand, and its error for an exponential law, b / sqrt(n)."""
     made = sizes(np.random.default_rng(1), 1.2, 4000)
     found = b_value(made, completeness=0.0)
-    assert found.value == pytest.approx(np.log10(np.e) / np.log10(made).mean())
+    assert found.value == pytest.approx(np.log10(np.e) / np.log10(made).mean() * 3999 / 4000)
     assert found.error == pytest.approx(found.value / np.sqrt(4000), rel=0.1)
     assert abs(found.value - 1.2) < 3 * found.error
     assert found.p_value > 0.05
@@ -31,6 +31,22 @@ def test_completeness_is_above_what_is_missing():
     assert abs(found.value - 1.0) < 3 * found.error
     assert b_value(made, completeness=0.0).p_value < 0.05
     assert b_value(made[:10]) is None
+
+
+@pytest.mark.parametrize(("count", "max_error"), [(190, 0.6), (3000, 0.1)])
+def test_large_b_values_with_a_gradual_detection(count, max_error):
+    """Few events are all fitted, with their detection; of many, those above the completeness."""
+    rng = np.random.default_rng(4)
+    found = [b_value(sizes(rng, 1.5, count, blur=0.2)) for _ in range(8)]
+    assert all((one.count == count) == (count < 200) for one in found)
+    assert all(abs(one.value - 1.5) < 3 * one.error for one in found)
+    bias = np.mean([(one.value - 1.5) / one.error for one in found])
+    assert abs(bias) < 3 / np.sqrt(8)
+    assert np.median([one.error for one in found]) < max_error
+
+
+def test_a_fit_that_cannot_tell_the_law_from_the_detection_is_none():
+    assert b_value(10 ** np.random.default_rng(1).normal(0, 0.3, 40)) is None
 
 
 def test_omori_decay_and_its_absence():

@@ -157,6 +157,27 @@ def test_the_peak_after_a_velocity_step_is_no_slip(evolution):
         assert len(find_slips(time, force + noise)) == 0
 
 
+@pytest.mark.parametrize("noise", [0.02, 0.1, 0.3])
+def test_ringing_after_slips_is_no_slip(noise):
+    """One to three more cycles about a constant force, that rise 2.5 times as fast as loading."""
+    rng = np.random.default_rng(1)
+    step, period, loading, low = 1e-3, 0.02, 170.0, -1.0
+    pieces: list[np.ndarray] = []
+    for _ in range(40):
+        top = rng.uniform(3.5, 6.5)
+        phase = np.arange(0, 2 * np.pi * (rng.integers(1, 4) + 0.5), 2 * np.pi * step / period)
+        ringing = top * np.exp(-0.03 * phase) * np.cos(phase)
+        pieces += [np.arange(low, top, loading * step), ringing]
+        low = ringing[-1]
+    force, wanted = np.concatenate(pieces), np.cumsum([one.size for one in pieces])[::2]
+    found = find_slips(
+        step * np.arange(force.size), force + noise * rng.standard_normal(force.size)
+    )
+    assert abs(len(found) - 40) <= 1
+    near = np.abs(found.start_time[:, None] - step * wanted).min(axis=0)
+    assert (near < period / 4).all()
+
+
 def test_two_sampling_rates_in_one_record():
     """The same slips where the recorder was ten times as fast for a part."""
     tree = mesoslip.run(klein_tables(run__duration=8.0, output__interval=2e-4))

@@ -5,24 +5,34 @@ python tests/studies/event_coverage.py [COUNT]
 
 from __future__ import annotations
 
+import itertools
 import math
 import sys
 
 import numpy as np
 from mesoslip.analysis.events import b_value, omori
 from numpy.typing import NDArray
-from scipy.special import ndtr
 
 Array = NDArray[np.float64]
 
 
 def sizes(rng: np.random.Generator, b: float, count: int, blur: float = 0.0) -> Array:
-    """Sizes with a b-value, of magnitudes from 0; with a gradual completeness around 0.5."""
-    if blur == 0:
-        return np.asarray(rng.pareto(b, count) + 1)
-    found = rng.pareto(b, 20 * count) + 1
-    seen = ndtr((np.log10(found) - 0.5) / blur) > rng.random(found.size)
-    return np.asarray(found[seen][:count])
+    """Sizes with a b-value: of magnitudes from 0, or with a gradual completeness around 0.5.
+
+    The detection is a cumulative normal distribution of the magnitude; of an exponential law, the
+    detected magnitudes are exponential around normal ones.
+    """
+    rate = b * math.log(10)
+    middle = 0.5 - rate * blur**2 if blur else 0.0
+    return np.asarray(
+        10 ** (middle + rng.exponential(1 / rate, count) + blur * rng.normal(0, 1, count))
+    )
+
+
+def ramp(rng: np.random.Generator, b: float, count: int) -> Array:
+    """Sizes from 1 on that are detected with a probability that grows from 0 at 1.5 to 1 at 5.5."""
+    found = rng.pareto(b, 40 * count) + 1
+    return np.asarray(found[(found - 1.5) / 4 > rng.random(found.size)][:count])
 
 
 def sequence(
@@ -45,19 +55,21 @@ def sequence(
 def main(count: int) -> None:
     """Print shares of results within 1.96 standard errors."""
     rng = np.random.default_rng(1)
+    kinds = {"sharp": 0.0, "gradual": 0.2, "wide": 0.4}
     for b in (0.7, 1.0, 1.5):
-        for number, blur in ((50, 0.0), (300, 0.0), (300, 0.2), (3000, 0.2)):
+        for kind, number in itertools.product((*kinds, "ramp"), (50, 200, 1000)):
             ratios = []
             for _ in range(count):
-                found = b_value(sizes(rng, b, number, blur))
+                made = sizes(rng, b, number, kinds[kind]) if kind in kinds else ramp(rng, b, number)
+                found = b_value(made)
                 if found is not None:
                     ratios.append((found.value - b) / found.error)
             inside = np.mean(np.abs(ratios) < 1.96)
             print(
-                f"b {b}, {number} events, blur {blur}: {inside:.2f} of {len(ratios)} inside, ",
-                end="",
+                f"b {b}, {kind}, {number} events: {inside:.2f} of {len(ratios)} inside, "
+                f"bias {np.mean(ratios):+.2f} errors",
+                flush=True,
             )
-            print(f"bias {np.mean(ratios):+.2f} errors")
     for p in (0.9, 1.2):
         for main_count, each in ((5, 40), (20, 40)):
             inside, decays = [], []

@@ -66,9 +66,12 @@ class Extremes:
         return extremes[:-1][is_fall], extremes[1:][is_fall]
 
 
-def extremes_of(values: Array) -> Extremes:
-    """The extremes of a trace of shape (samples,), in a time proportional to its length."""
-    at, inner = _without_inner_cycles(values, _turning_points(values))
+def extremes_of(values: Array, min_size: float = 0.0) -> Extremes:
+    """The extremes of a trace of shape (samples,), in a time proportional to its length.
+
+    With a minimum size, they are those for thresholds from it on: smaller cycles are not kept.
+    """
+    at, inner = _without_inner_cycles(values, _turning_points(values), min_size)
     levels = values[at].tolist()
     stack: list[int] = []
     cycles: list[tuple[int, int]] = []
@@ -78,15 +81,16 @@ def extremes_of(values: Array) -> Extremes:
             size = abs(last - before)
             if size > abs(level - last) or size > abs(before - levels[stack[-3]]):
                 break
-            cycles.append((stack[-2], stack[-1]))
+            if size >= min_size:
+                cycles.append((stack[-2], stack[-1]))
             del stack[-2:]
         stack.append(number)
     pairs = np.concatenate([inner, at[np.array(cycles, dtype=int).reshape(-1, 2)]])
     return Extremes(values, pairs[:, 0], pairs[:, 1], at[stack])
 
 
-def _without_inner_cycles(values: Array, at: Samples) -> tuple[Samples, Samples]:
-    """Turning points without cycles of neighbours, and these cycles, shape (cycles, 2).
+def _without_inner_cycles(values: Array, at: Samples, min_size: float) -> tuple[Samples, Samples]:
+    """Turning points without cycles of neighbours, and the large ones of these, shape (cycles, 2).
 
     Such pairs have no point in common, and each pass removes most points of a noisy trace.
     """
@@ -96,17 +100,23 @@ def _without_inner_cycles(values: Array, at: Samples) -> tuple[Samples, Samples]
         inner = 1 + np.flatnonzero((sizes[1:-1] < sizes[:-2]) & (sizes[1:-1] < sizes[2:]))
         if inner.size == 0:
             break
-        found.append(np.stack([at[inner], at[inner + 1]], axis=1))
-        at = np.delete(at, np.concatenate([inner, inner + 1]))
+        large = inner[sizes[inner] >= min_size]
+        found.append(np.stack([at[large], at[large + 1]], axis=1))
+        kept = np.ones(at.size, dtype=bool)
+        kept[inner] = kept[inner + 1] = False
+        at = at[kept]
     return at, np.concatenate(found)
 
 
 def _turning_points(values: Array) -> Samples:
     """The first and the last sample, and the first of each maximum and minimum between."""
-    steps = np.diff(values)
-    moving = np.flatnonzero(steps)
-    if moving.size == 0:
+    moves, rising = values[1:] != values[:-1], values[1:] > values[:-1]
+    if not moves.any():
         return np.array([0] if len(values) else [], dtype=int)
-    rising = steps[moving] > 0
-    turns = np.flatnonzero(rising[1:] != rising[:-1])
-    return np.concatenate([[0], moving[turns] + 1, [len(values) - 1]])
+    if moves.all():
+        turns = np.flatnonzero(rising[1:] != rising[:-1]) + 1
+    else:
+        moving = np.flatnonzero(moves)
+        rising = rising[moving]
+        turns = moving[np.flatnonzero(rising[1:] != rising[:-1])] + 1
+    return np.concatenate([[0], turns, [len(values) - 1]])

@@ -1,4 +1,4 @@
-"""The b-value of sizes by Aki's likelihood, and the decay of rates by Omori's law.
+"""The b-value of sizes by their likelihood, and the decay of rates by Omori's law.
 
 A magnitude is the decimal logarithm of a size. With the probability 10^(-b M) of a larger one,
 sizes follow a power law of exponent 1 + b.
@@ -7,16 +7,30 @@ sizes follow a power law of exponent 1 + b.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-# Width of a bin of magnitudes, and the distance of the completeness from the fullest one.
-BIN, MARGIN = 0.1, 0.2
+# Step of the completeness while the law is rejected.
+BIN = 0.1
+# Standard deviations of the detection from the magnitude of half to the completeness, at 99.4 %.
+MARGIN = 2.5
+# Minimum number of events above the completeness with which the others are left out.
+MIN_COMPLETE = 200
+# Maximum number of events from which the detection is estimated.
+MAX_DETECTED = 10_000
+# Starts of the estimate, widths of the detection over the standard deviation of the magnitudes;
+# and the minimum.
+WIDTHS, MIN_WIDTH = (0.05, 0.5), 1e-3
+# Half of the likelihood ratio, and number of standard errors, at the ends of a 95 % interval.
+LIKELIHOOD_95, NORMAL_95 = 1.92, 1.96
+# Maximum logarithm of the end of that interval over the estimate.
+MAX_REACH = 2.0
 # Maximum probability at which the law is rejected.
 REJECTED = 0.05
 # Minimum number of events of a fit.
@@ -32,30 +46,39 @@ class BValue:
     value: float
     error: float
     completeness: float
-    """Minimum magnitude of the fit."""
+    """Magnitude from which on the law is fitted, or tested if all events are."""
     count: int
-    """Events of that magnitude or larger."""
+    """Events of the fit."""
     p_value: float
-    """Probability of as large a distance from the law, if it holds."""
+    """Probability of as large a distance from the law, if it holds, above the completeness."""
+    half_detected: float = math.nan
+    """Magnitude of which half of the events are detected, if all events are fitted."""
 
 
 def b_value(sizes: Array, completeness: float | None = None) -> BValue | None:
-    """Aki's b-value of positive sizes; None for too few.
+    """The b-value of positive sizes; None for too few.
 
-    The completeness is by default the maximum curvature of the distribution, with a margin of 0.2
-    (Woessner and Wiemer, Bull. Seismol. Soc. Am. 95, 684 (2005)), or above it the first from which
-    on the law is not rejected. The error is that of Shi and Bolt
-    (ibid. 72, 1677 (1982)).
+    The probability of detection is a cumulative normal distribution of the magnitude, and law and
+    detection are fitted to all events (Ogata and Katsura, Geophys. J. Int. 113, 727 (1993)). The
+    completeness is 2.5 standard deviations above the magnitude of which half is detected, as that
+    of Woessner and Wiemer (Bull. Seismol. Soc. Am. 95, 684 (2005)); if the law is rejected there,
+    it is the first magnitude above at which it is not. With 200 events above it, or a rejection
+    below, or a completeness that is given, b is Aki's of these events; and that of the fit of all
+    events otherwise, with an error from the profile of the likelihood.
     """
     sizes = np.asarray(sizes, dtype=float)
     magnitude = np.log10(sizes[np.isfinite(sizes) & (sizes > 0)])
-    if magnitude.size < MIN_EVENTS:
+    if magnitude.size < MIN_EVENTS or np.ptp(magnitude) == 0:
         return None
     if completeness is not None:
         return _fit(magnitude, completeness)
-    found = _fit(magnitude, _fullest(magnitude))
-    while found is not None and found.p_value < REJECTED:
-        # The detection of events grows over a wide range, or they follow no such law.
+    every = _with_detection(magnitude)
+    found = _fit(magnitude, every.completeness)
+    if found is None or (found.count < MIN_COMPLETE and found.p_value >= REJECTED):
+        # An infinite error: detection and law are not told apart.
+        return every if math.isfinite(every.error) else None
+    while found.p_value < REJECTED:
+        # The detection of events is no such distribution, or they follow no such law.
         higher = _fit(magnitude, found.completeness + BIN)
         if higher is None:
             break
@@ -63,14 +86,62 @@ def b_value(sizes: Array, completeness: float | None = None) -> BValue | None:
     return found
 
 
-def _fullest(magnitude: Array) -> float:
-    """Completeness by the maximum curvature."""
-    edges = np.arange(magnitude.min(), magnitude.max() + BIN, BIN)
-    if edges.size < 3:
-        return float(magnitude.min())
-    fullest = int(np.argmax(np.histogram(magnitude, edges)[0]))
-    # Below the first bin no event is missing.
-    return float(edges[fullest] + (MARGIN if fullest else 0.0))
+def _with_detection(magnitude: Array) -> BValue:
+    """The b-value by all events, which are detected by a cumulative normal distribution.
+
+    With the rate beta = b ln 10, its mean mu and its standard deviation s, their density is
+    beta exp(-beta (M - mu) - beta^2 s^2 / 2) Phi((M - mu) / s).
+    """
+    from scipy.optimize import brentq, minimize
+    from scipy.special import log_ndtr
+
+    every = magnitude[:: -(-magnitude.size // MAX_DETECTED)]
+    middle, spread, count = float(every.mean()), float(every.std()), every.size
+    values = (every - middle) / spread
+
+    def cost(beta: float, mu: float, width: float) -> float:
+        """Negative logarithm of the likelihood, of magnitudes in standard deviations."""
+        width = max(width, MIN_WIDTH)
+        law = math.log(beta) + beta * mu - 0.5 * (beta * width) ** 2
+        return -count * law - float(log_ndtr((values - mu) / width).sum())
+
+    def fitted(function: Callable[[Array], float], start: Sequence[float], tol: float) -> Any:
+        return minimize(function, start, method="Nelder-Mead", tol=tol)
+
+    fits = []
+    for width in WIDTHS:
+        rate = 1 / math.sqrt(1 - width**2)
+        start = (math.log(rate), rate * width**2 - 1 / rate, math.log(width))
+        fits.append(fitted(lambda x: cost(math.exp(x[0]), x[1], math.exp(x[2])), start, 1e-4))
+    best = min(fits, key=lambda one: float(one.fun))
+    rate, mu = math.exp(best.x[0]), float(best.x[1])
+    width = max(math.exp(best.x[2]), MIN_WIDTH)
+
+    def excess(shift: float) -> float:
+        """Cost of a rate that is larger by a factor exp(shift), above that at the end."""
+        beta, start = rate * math.exp(shift), (mu, math.log(width))
+        lowest = fitted(lambda x: cost(beta, x[0], math.exp(x[1])), start, 1e-3).fun
+        return float(lowest - best.fun) - LIKELIHOOD_95
+
+    ends = []
+    for sign in (-1, 1):
+        reach = sign / math.sqrt(count)
+        while excess(reach) < 0 and abs(reach) < MAX_REACH:
+            reach *= 2
+        is_found = abs(reach) < MAX_REACH
+        shift = brentq(excess, 0, reach, xtol=0.01) if is_found else sign * math.inf
+        ends.append(rate * math.exp(shift))
+    to_b = math.log10(math.e) / spread
+    completeness = max(middle + spread * (mu + MARGIN * width), float(magnitude.min()))
+    kept = magnitude[magnitude >= completeness]
+    return BValue(
+        to_b * rate,
+        to_b * (ends[1] - ends[0]) / (2 * NORMAL_95),
+        completeness,
+        magnitude.size,
+        _p_value(kept - completeness) if kept.size else 1.0,
+        middle + spread * mu,
+    )
 
 
 def _fit(magnitude: Array, completeness: float) -> BValue | None:
@@ -81,9 +152,9 @@ def _fit(magnitude: Array, completeness: float) -> BValue | None:
     excess = float(kept.mean()) - completeness
     if excess <= 0:
         return None
-    value = math.log10(math.e) / excess
-    scatter = math.sqrt(float(np.sum((kept - kept.mean()) ** 2)) / kept.size / (kept.size - 1))
-    error = math.log(10) * value**2 * scatter
+    # Without the bias by few events.
+    value = math.log10(math.e) / excess * (kept.size - 1) / kept.size
+    error = value / math.sqrt(kept.size - 2)
     return BValue(value, error, completeness, kept.size, _p_value(kept - completeness))
 
 

@@ -76,9 +76,13 @@ class EventSummary:
         if self.b is None:
             yield "b-value", "too few events, or all of one size"
         else:
-            yield "b-value (Aki)", with_error(self.b.value, self.b.error)
-            yield "magnitudes log10(size) from", number(self.b.completeness)
-            yield "events from there on", str(self.b.count)
+            is_aki = math.isnan(self.b.half_detected)
+            label = "b-value (Aki)" if is_aki else "b-value (with detection)"
+            yield label, with_error(self.b.value, self.b.error)
+            yield "events of the fit", str(self.b.count)
+            if not is_aki:
+                yield "half are detected at log10(size)", number(self.b.half_detected)
+            yield "completeness, log10(size)", number(self.b.completeness)
             verdict = "rejected" if self.b.p_value < 0.05 else "not rejected"
             yield "Gutenberg-Richter law", f"{verdict} (p = {number(self.b.p_value, 2)})"
         if self.omori is None:
@@ -245,8 +249,8 @@ def events(
         Minimum amplitude of an event of the channel, in its unit; 6 standard deviations of its
         noise by default.
     completeness
-        Minimum magnitude, the decimal logarithm of a size, of the b-value; by default 0.2 above the
-        maximum curvature of the distribution.
+        Minimum magnitude, the decimal logarithm of a size, of the b-value; by default from a fit of
+        the probability of detection, which is fitted together with b if there are few events.
     main_size
         Minimum size of main events, after which the rate may decay; the largest 5 % by default.
 

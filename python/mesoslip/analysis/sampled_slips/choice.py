@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -69,7 +69,7 @@ class Choice(NamedTuple):
     counts: SlipCounts
 
 
-def chosen(every: Sequence[Level]) -> Choice:
+def chosen(every: Iterable[Level]) -> Choice:
     """The smallest minimum fall at which slips stand out.
 
     Of the medians that find about as many, the one with the longest plateau of their number.
@@ -98,9 +98,10 @@ def _at(level: Level) -> Choice:
     if deepest > level.floor > 0:
         steps = math.ceil(math.log(deepest / level.floor) / math.log(THRESHOLD_RATIO))
     rows: list[tuple[float, int, int, int]] = []
+    mirror = level.mirror()
     for number in reversed(range(steps)):
         threshold = level.floor * THRESHOLD_RATIO**number
-        steep_count, mirrored = level.steep_counts(threshold)
+        steep_count, mirrored = level.trace.steep_count(threshold), mirror.steep_count(threshold)
         rows.append((threshold, level.slips(threshold)[0].size, steep_count, mirrored))
         if mirrored > max(MAX_NOISE, steep_count / 2):
             break
@@ -134,8 +135,10 @@ def _stands_out(level: Level, threshold: float, is_one_sided: bool) -> bool:
     tops, bottoms = level.trace.falls(threshold)
     chance = SIGNIFICANCE / math.sqrt(tops.size)
     if is_one_sided:
-        ratios = np.log(level.trace.ratios(tops, bottoms))
-        if float(ratios.mean()) >= NOISE_RATIOS * chance:
+        # Of falls that follow slow rises, as slips do, the ratios are chosen.
+        every = level.trace.exceeding(threshold, with_rebounds=True)
+        ratios = np.log(level.trace.ratios(*every))
+        if float(ratios.mean()) >= NOISE_RATIOS * SIGNIFICANCE / math.sqrt(ratios.size):
             return True
     excess = (level.trace.force[tops] - level.trace.force[bottoms]) ** 2 - threshold**2
     is_regular = float(np.std(excess)) <= NOISE_FALLS * (1 - chance) * float(excess.mean())

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +14,7 @@ from mesoslip.analysis.alternating_extremes import Samples
 from mesoslip.analysis.noise import TraceNoise, estimate_noise
 from mesoslip.analysis.sampled_slips.choice import SlipCounts, chosen
 from mesoslip.analysis.sampled_slips.ends import ends_of, fall_period, fall_rates
-from mesoslip.analysis.sampled_slips.levels import levels
+from mesoslip.analysis.sampled_slips.levels import Level, levels
 
 Array = NDArray[np.float64]
 
@@ -75,19 +77,17 @@ def find_slips(
         cleaned = direction * noise.clean(time, direction * force)
     else:
         cleaned = force
+    del force
     sigma = noise.total_deviation if isinstance(noise, TraceNoise) else noise
-    every = list(levels(time, cleaned, noise, period=period, loading_rate=loading_rate))
-    choice = chosen(every)
+    every = partial(levels, time, cleaned, noise, period=period, loading_rate=loading_rate)
+    choice = chosen(every())
     level, tops, bottoms, counts = choice.level, choice.tops, choice.bottoms, choice.counts
     if min_fall is None:
         min_fall = choice.min_fall
     else:
-        # The widest median that hardly changes a fall.
-        whole = every[0].trace
-        widest = fall_period(time, whole.force, *whole.exceeding(min_fall)) / 4
-        level = [one for one in every if one is every[0] or one.width <= widest][-1]
+        level = _level_of(every(min_fall=min_fall), min_fall)
         tops, bottoms = level.trace.exceeding(min_fall)
-        counts = counts.with_row(min_fall, tops.size, level.steep_counts(min_fall)[1])
+        counts = counts.with_row(min_fall, tops.size, level.mirror().steep_count(min_fall))
     if tops.size == 0:
         return _none(period, min_fall, counts)
     if period is None:
@@ -111,6 +111,18 @@ def find_slips(
         period,
         counts,
     )
+
+
+def _level_of(every: Iterator[Level], min_fall: float) -> Level:
+    """The widest median that hardly changes a fall."""
+    level = next(every)
+    whole = level.trace
+    widest = fall_period(whole.time, whole.force, *whole.exceeding(min_fall)) / 4
+    for one in every:
+        if one.width > widest:
+            break
+        level = one
+    return level
 
 
 def estimated_period(time: Array, force: Array, noise: float) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -21,8 +21,8 @@ MIN_HEIGHT = 1e-3
 MIN_STEPS = 2.0
 # Widths of the running median, in samples.
 WIDTHS = (1, 3, 5, 9, 17, 33, 65, 129, 257)
-# Maximum rate of loading over the median rate of rises: force that rises faster is a rebound.
-MAX_LOADING = 3.0
+# Maximum rate of loading over the median rate of rises: what rises beyond it is a rebound.
+MAX_LOADING = 1.5
 # Minimum depth of a slip over the rebound before it.
 MIN_FALL_RATIO = 2.0
 # Minimum rate of a slip over that of the deepest fall.
@@ -49,17 +49,19 @@ class Side:
     period: float | None
     """Period of the setup, if given [s]."""
     floor: float
+    min_size: float
+    """Minimum fall for which extremes are asked for."""
     original: Side | None = None
     """The trace, of a mirror image."""
-    _falls: dict[float, tuple[Samples, Samples]] = field(default_factory=dict)
-    _excess: dict[int, tuple[Samples, Samples, Array]] = field(default_factory=dict)
-    _ratios: dict[tuple[int, int], float] = field(default_factory=dict)
-    _before: dict[tuple[int, int], int] = field(default_factory=dict)
+    _falls: dict[float, tuple[Samples, Samples]] = field(init=False, default_factory=dict)
+    _excess: dict[int, tuple[Samples, Samples, Array]] = field(init=False, default_factory=dict)
+    _ratios: dict[tuple[int, int], float] = field(init=False, default_factory=dict)
+    _before: dict[tuple[int, int], int] = field(init=False, default_factory=dict)
 
     @cached_property
     def extremes(self) -> Extremes:
         """Alternating extremes for all thresholds."""
-        return extremes_of(self.force)
+        return extremes_of(self.force, self.min_size)
 
     def falls(self, threshold: float) -> tuple[Samples, Samples]:
         """Samples of maximum and minimum of falls above a threshold, but for very slow ones."""
@@ -71,16 +73,18 @@ class Side:
             self._falls[threshold] = tops[kept], bottoms[kept]
         return self._falls[threshold]
 
-    def exceeding(self, threshold: float) -> tuple[Samples, Samples]:
+    def exceeding(
+        self, threshold: float, *, with_rebounds: bool = False
+    ) -> tuple[Samples, Samples]:
         """Samples of maximum and minimum of falls that exceed rebounds by a threshold.
 
-        A fall from the first sample on has no start.
+        A fall from the first sample on has no start. With rebounds, they are all the others.
         """
         rank = self.extremes.rank(threshold)
         if rank not in self._excess:
             self._excess[rank] = self._excess_of(*self.extremes.falls(threshold))
         tops, bottoms, excess = self._excess[rank]
-        kept = excess > threshold
+        kept = tops > 0 if with_rebounds else excess > threshold
         return tops[kept], bottoms[kept]
 
     def _excess_of(self, tops: Samples, bottoms: Samples) -> tuple[Samples, Samples, Array]:
@@ -109,19 +113,22 @@ class Side:
         return float(drop[at] / (self.time[bottoms[at]] - self.time[tops[at]]))
 
     def _rebound(self, low: int, top: int, bottom: int) -> float:
-        """Rise just before a fall that is faster than loading, as ringing and impulses are.
+        """Rise just before a fall beyond that by loading, as of ringing and impulses.
 
-        Noise, which increases the difference of a maximum and a minimum, is subtracted.
+        A slider at rest is loaded at a constant rate at most, and one that rings rises by the
+        amplitude in half a period. Noise, which increases the difference of a maximum and a
+        minimum, is subtracted.
         """
         time = self.time
         duration = REBOUND * (time[bottom] - time[top])
         if self.period is not None:
             duration = 0.5 * REBOUND * self.period
         first = max(low, int(np.searchsorted(time, time[top] - duration)))
-        lowest = first + int(np.argmin(self.force[first : top + 1]))
-        rise = float(self.force[top] - self.force[lowest])
-        if lowest == top or rise <= MAX_LOADING * self._rising * (time[top] - time[lowest]):
+        if math.isinf(self._rising):
             return 0.0
+        since = slice(first, top + 1)
+        loading = MAX_LOADING * self._rising * (time[top] - time[since])
+        rise = float(np.max(self.force[top] - self.force[since] - loading))
         return max(rise - self.floor / 2, 0.0)
 
     def ratios(self, tops: Samples, bottoms: Samples) -> Array:
@@ -131,6 +138,13 @@ class Side:
             if one not in self._ratios:
                 self._ratios[one] = self._ratio(*one)
         return np.array([self._ratios[one] for one in pairs])
+
+    def steep_count(self, threshold: float) -> int:
+        """Number of falls much faster than the rises before.
+
+        Those of the mirror image are of noise, which makes as many in both.
+        """
+        return int(np.count_nonzero(self.ratios(*self.falls(threshold)) >= 1 / MIN_RATIO))
 
     def _ratio(self, top: int, bottom: int) -> float:
         force, time, before = self.force, self.time, self._before[top, bottom]
@@ -174,24 +188,19 @@ class Level:
     width: float  # of the median [s]
     floor: float  # minimum fall above the white noise
     trace: Side
-    mirror: Side
+    slope: float  # of the line of loading
+
+    def mirror(self) -> Side:
+        """The trace mirrored in its line of loading."""
+        one = self.trace
+        mirrored = 2 * self.slope * (one.time - one.time[0]) - one.force
+        return replace(one, force=mirrored, original=one)
 
     def slips(self, threshold: float) -> tuple[Samples, Samples]:
         """Samples of maximum and minimum of the slips above a threshold."""
         tops, bottoms = self.trace.falls(threshold)
         kept = self.trace.ratios(tops, bottoms) >= MIN_RATIO
         return tops[kept], bottoms[kept]
-
-    def steep_counts(self, threshold: float) -> tuple[int, int]:
-        """Numbers of falls much faster than the rises before, in the trace and in its mirror image.
-
-        The latter are of noise, which makes as many in both.
-        """
-        trace, mirror = (
-            np.count_nonzero(one.ratios(*one.falls(threshold)) >= 1 / MIN_RATIO)
-            for one in (self.trace, self.mirror)
-        )
-        return int(trace), int(mirror)
 
     def on_samples(
         self, force: Array, tops: Samples, bottoms: Samples
@@ -220,8 +229,12 @@ def levels(
     *,
     period: float | None = None,
     loading_rate: float | None = None,
+    min_fall: float = math.inf,
 ) -> Iterator[Level]:
-    """The trace after running medians, from narrow to wide, until noise is negligible."""
+    """The trace after running medians, from narrow to wide, until noise is negligible.
+
+    Falls are those above the noise, or above a smaller minimum. Long traces are held one at a time.
+    """
     parts = parts_of(time)
     interval = max(parts, key=len).interval
     if isinstance(noise, TraceNoise):
@@ -243,10 +256,10 @@ def levels(
         slope = float(
             np.median((filtered[reach:] - filtered[:-reach]) / (time[reach:] - time[:-reach]))
         )
-        trace = Side(time, filtered, loading_rate, period, floor)
-        mirrored = 2 * slope * (time - time[0]) - filtered
-        mirror = Side(time, mirrored, loading_rate, period, floor, trace)
-        yield Level(parts, width * interval, floor, trace, mirror)
+        # The rate of loading is that between falls of half the typical size.
+        min_size = min(floor / 2, min_fall)
+        trace = Side(time, filtered, loading_rate, period, floor, min_size)
+        yield Level(parts, width * interval, floor, trace, slope)
         if noise_range <= height and not isinstance(noise, TraceNoise):
             return
 

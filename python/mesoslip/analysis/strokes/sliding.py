@@ -30,9 +30,9 @@ class Sliding:
 
     samples: NDArray[np.int_]
     """Samples of the record."""
-    piece: NDArray[np.int_]
+    piece: NDArray[np.int32]
     """Number of the piece."""
-    sign: Array
+    sign: NDArray[np.int8]
     """Sign of the force along the motion in the record."""
     force: Array
     """Force along the motion."""
@@ -84,16 +84,18 @@ class Sliding:
 def sliding_of(force: Array, pieces: Sequence[Piece]) -> Sliding:
     """The sliding parts of a record that goes back and forth."""
     pole = polarity(force, pieces)
-    samples, numbers, signs = [np.empty(0, dtype=int)], [], []
+    starts, sizes, signs = (np.empty(len(pieces), dtype=int) for _ in range(3))
     for number, one in enumerate(pieces):
-        along = pole * one.direction * force[one.samples]
+        signs[number] = pole * one.direction
+        along = signs[number] * force[one.samples]
         start = int(np.argmax(along >= np.median(along[_middle(one.size)])))
-        if one.size - start >= MIN_SAMPLES:
-            samples.append(np.arange(one.first + start, one.after))
-            numbers += [number] * (one.size - start)
-            signs += [pole * one.direction] * (one.size - start)
-    at, sign = np.concatenate(samples), np.array(signs, dtype=float)
-    return Sliding(at, np.array(numbers, dtype=int), sign, sign * force[at])
+        starts[number], sizes[number] = one.first + start, one.size - start
+    sizes[sizes < MIN_SAMPLES] = 0
+    # Long records are not repeated in lists.
+    piece = np.repeat(np.arange(len(pieces), dtype=np.int32), sizes)
+    sign = np.repeat(signs.astype(np.int8), sizes)
+    at = np.arange(piece.size) + np.repeat(starts - (np.cumsum(sizes) - sizes), sizes)
+    return Sliding(at, piece, sign, sign * force[at])
 
 
 def polarity(force: Array, pieces: Sequence[Piece]) -> float:

@@ -283,7 +283,8 @@ def _without_room(
     """Try a command on a full disk, or where no file may be longer than a limit [bytes]."""
     is_old = random.random() < 0.5
     if is_old:
-        output.write_bytes(b"mine")
+        # Files of others are refused, but for empty ones.
+        output.write_bytes(b"")
     before = look_of(folder)
 
     def limit_files() -> None:

@@ -158,6 +158,23 @@ def test_ramps_and_noise_have_no_steps():
     assert second.first == pytest.approx(2200, abs=30)
 
 
+@pytest.mark.parametrize("samples", [20, 100, 400, 1200])
+def test_correlated_noise_of_a_force_makes_no_plateaus(samples):
+    """Whatever its correlation; sharp steps on it are found, but for cuts by the noise."""
+    memory = math.exp(-1 / samples)
+    for seed in range(2):
+        rng = np.random.default_rng([samples, seed])
+        slow = lfilter(
+            [math.sqrt(1 - memory**2)], [1.0, -memory], rng.standard_normal(4000 + 5 * samples)
+        )[-4000:]
+        noise = slow + 0.1 * rng.standard_normal(4000)
+        assert len(levels_of(noise, are_sharp=True)) == 1
+        if samples < 1000:
+            # Longer correlated noise drifts in a plateau, which is a ramp then.
+            step = 20 * (np.arange(4000) > 2500)
+            assert len(levels_of(noise + step, are_sharp=True)) == 2
+
+
 def test_strokes_and_other_signals_are_refused():
     time = 0.01 * np.arange(800)
     force = np.clip(5 * np.sin(math.tau * time), -1, 1)

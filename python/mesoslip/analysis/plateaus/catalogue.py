@@ -210,7 +210,7 @@ def _levels(
         raise FileError(f"{name}: has no record of the {signal}; --signal force is always there")
     stepped = {key: one for key, one in known.items() if len(one) > 1}
     if signal == FORCE or (signal is None and not stepped):
-        return levels_of(signals[FORCE]), FORCE
+        return levels_of(signals[FORCE], are_sharp=True), FORCE
     chosen = list((stepped or known).values())
     levels = chosen[0]
     for other in chosen[1:]:

@@ -34,6 +34,9 @@ MIN_RATIO = 3.0
 MAX_DRIFT, MAX_DRIFT_ERRORS = 0.5, 4.0
 # Minimum number of standard errors of the difference of plateaus.
 MIN_ERRORS = 4.0
+# Minimum size of a step over that of differences of means over the same times elsewhere, in
+# standard deviations: the maximum of thousands of normal ones is about 4.
+MIN_SHARPNESS = 5.0
 # Median of the absolute value of a standard normal deviate.
 NORMAL_MEDIAN = 0.6744897501960817
 
@@ -46,10 +49,12 @@ class Level(NamedTuple):
     mean: float
 
 
-def levels_of(values: Array, min_change: float = 0.0) -> list[Level]:
+def levels_of(values: Array, min_change: float = 0.0, *, are_sharp: bool = False) -> list[Level]:
     """Plateaus of a signal, which differ by more than a share of the larger one of two levels.
 
-    That share is of a speed or a load, which are positive: of those their logarithms are cut.
+    That share is of a speed or a load, which are positive: of those their logarithms are cut. Sharp
+    steps exceed what the signal changes elsewhere in the same time, over at least some time: noise
+    of any correlation has none.
     """
     known = np.flatnonzero(np.isfinite(values))
     if known.size < 2 * MIN_POINTS:
@@ -71,6 +76,8 @@ def levels_of(values: Array, min_change: float = 0.0) -> list[Level]:
     levels = _joined(means, pieces, noise, min_change)
     longest = max((after - first for first, after in levels), default=0)
     levels = [one for one in levels if one[1] - one[0] >= MIN_SHARE * longest]
+    if are_sharp:
+        levels = _between_sharp_steps(means, levels)
     ends = np.append(known, values.size)
     # A mean at an end may have samples of both sides.
     edge = int(edges[1] > 1)
@@ -153,3 +160,29 @@ def _joined(
                 break
             found[-2:] = [(first, after)]
     return found
+
+
+def _between_sharp_steps(means: Array, levels: list[tuple[int, int]]) -> list[tuple[int, int]]:
+    """Pieces, of which those without a sharp step between them are joined."""
+    found = levels[:1]
+    for piece in levels[1:]:
+        if _is_sharp(means, found[-1], piece):
+            found.append(piece)
+        else:
+            found[-1] = (found[-1][0], piece[1])
+    return found
+
+
+def _is_sharp(means: Array, one: tuple[int, int], two: tuple[int, int]) -> bool:
+    """Whether a step exceeds the differences of means of some length, at the same distance."""
+    total = np.concatenate([[0.0], np.cumsum(means - means.mean())])
+    gap = two[0] - one[1]
+    for length in LENGTHS:
+        if length > min(one[1] - one[0], two[1] - two[0]):
+            break
+        sums = total[length:] - total[:-length]
+        steps = sums[length + gap :] - sums[: sums.size - length - gap]
+        scatter = float(np.median(np.abs(steps - np.median(steps)))) / NORMAL_MEDIAN
+        if abs(float(steps[one[1] - length])) > MIN_SHARPNESS * scatter:
+            return True
+    return False

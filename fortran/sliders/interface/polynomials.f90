@@ -74,7 +74,8 @@ contains
       end do
    end subroutine evaluate
 
-   !> Let a polynomial count from a later time, by repeated division; only its first terms are kept.
+   !> Let a polynomial count from a later time; only its first terms are kept. By Horner's rule with
+   !> polynomials as values: sums over terms side by side, unlike those of repeated division.
    pure subroutine move(series, order, time, kept)
       real(wp), intent(inout) :: series(0:)
       integer, intent(in) :: order
@@ -82,14 +83,22 @@ contains
       !> Order up to which the result is needed
       integer, intent(in) :: kept
 
-      integer :: pass, term
+      real(wp) :: moved(0:max_order)
+      integer :: term, degree, power
 
       if (.not. abs(time) > 0.0_wp) return
-      do pass = 0, min(kept, order - 1)
-         do term = order - 1, pass, -1
-            series(term) = series(term) + time * series(term + 1)
+      moved(0) = series(order)
+      do term = order - 1, 0, -1
+         degree = min(kept, order - term)
+         if (degree == order - term) moved(degree) = 0.0_wp
+         ! In vectors, each would wait for the overlapping ones that were just written.
+         !GCC$ NOVECTOR
+         do power = degree, 1, -1
+            moved(power) = time * moved(power) + moved(power - 1)
          end do
+         moved(0) = time * moved(0) + series(term)
       end do
+      series(:kept) = moved(:kept)
    end subroutine move
 
    !> Integral from zero, and the integral of that.

@@ -13,10 +13,10 @@ module mesoslip_sliders_interface_row
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_sliders_hazard_clock, only: advance_clocks, limit_window
    use mesoslip_sliders_interface_losses, only: add_losses, add_published_losses
-   use mesoslip_sliders_interface_polynomials, only: bound, evaluate, integrals, max_order, move
+   use mesoslip_sliders_interface_polynomials, only: bound, evaluate, integrals, max_order
    use mesoslip_sliders_interface_rest, only: try_rest
    use mesoslip_sliders_interface_series, only: drive_at, expand, expand_all, fastest_rate, &
-      & shorten_step
+      & expand_published, shorten_step
    use mesoslip_sliders_interface_state, only: busy_pace, load_motion, min_order, &
       & motion_of_damper, quiet_pace, row_state_type
    use mesoslip_sliders_motion_series, only: first_end, inverse
@@ -194,7 +194,8 @@ contains
             & + self%viscosity * (once + abs(self%excess_once(block)))
          if (effect <= self%tiny_displacement) exit
          self%block(block)%kind = event_publish
-         step = step * max(0.1_wp, min(0.9_wp, (0.5_wp * self%tiny_displacement / effect)**0.25_wp))
+         step = step * max(0.1_wp, min(0.9_wp, &
+            & sqrt(sqrt(0.5_wp * self%tiny_displacement / effect))))
       end do
    end subroutine limit_by_excess
 
@@ -373,8 +374,10 @@ contains
             if (neighbour < 1 .or. neighbour > self%blocks) cycle
             call continue_motion(self, neighbour)
          end do
+         call predict_next(self, block)
+      else
+         call continue_motion(self, block)
       end if
-      call continue_motion(self, block)
    end subroutine renew
 
    !> Expand the motion of a block, and find its next event.
@@ -382,10 +385,18 @@ contains
       class(row_state_type), intent(inout) :: self
       integer, intent(in) :: block
 
-      call expand(self, block, is_whole=.false.)
+      call expand(self, block)
+      call predict_next(self, block)
+   end subroutine continue_motion
+
+   !> Find the next event of a block in its step.
+   subroutine predict_next(self, block)
+      class(row_state_type), intent(inout) :: self
+      integer, intent(in) :: block
+
       call predict(self, block)
       call self%queue%update(block, self%moment(block) + self%span(block))
-   end subroutine continue_motion
+   end subroutine predict_next
 
    !> Let the neighbours of a block know its motion.
    subroutine publish(self, block)
@@ -398,17 +409,15 @@ contains
       shown(:self%order) = self%published(block, :self%order)
       call evaluate(shown, self%order, self%moment(block), value, slope, bend)
       excess = self%place(block) - value
-      call expand(self, block, is_whole=.true.)
       do neighbour = block - 1, block + 1, 2
          if (neighbour < 1 .or. neighbour > self%blocks) cycle
          call carry(self, neighbour, self%moment(block) - self%moment(neighbour))
          call give_excess(self, block, neighbour, excess)
       end do
+      ! Losses of the neighbours until now are those beside the motion published before.
+      call expand_published(self, block)
       self%excess_once(block) = 0.0_wp
       self%excess_twice(block) = 0.0_wp
-      shown(:self%order) = self%own(:self%order, block)
-      call move(shown, self%order, -self%moment(block), self%order)
-      self%published(block, :self%order) = shown(:self%order)
    end subroutine publish
 
    !> Give a neighbour what a block has done to it beyond its published motion.

@@ -7,7 +7,7 @@ module mesoslip_sliders_interface_series
    implicit none
    private
 
-   public :: drive_at, expand, expand_all, fastest_rate, shorten_step
+   public :: drive_at, expand, expand_all, expand_published, fastest_rate, shorten_step
 
 contains
 
@@ -26,7 +26,7 @@ contains
       real(wp), intent(in) :: stiffness, drag
       real(wp) :: rate
 
-      rate = 2.0_wp * self%max_neighbours * self%bond + maxval(self%pull) &
+      rate = 2.0_wp * self%max_neighbours * self%bond + self%max_pull &
          & + max(stiffness, self%pinned_stiffness) * self%inverse_mass
       rate = sqrt(rate) + drag * self%inverse_mass + self%damping &
          & + 2.0_wp * self%max_neighbours * self%viscosity
@@ -107,44 +107,82 @@ contains
       self%bend = self%published(:, 2)
    end subroutine expand_all
 
-   !> Motion of a block since its own time, under the published motion of its neighbours.
-   subroutine expand(self, block, is_whole)
+   !> Motion of a block since its own time, under the published motion of its neighbours, up to
+   !> about its next event.
+   subroutine expand(self, block)
       class(row_state_type), intent(inout) :: self
       integer, intent(in) :: block
-      !> Whether up to the end of the step; else until about its next event
-      logical, intent(in) :: is_whole
 
-      real(wp) :: around(0:max_order), shown(0:max_order), damper, stiffness, drag, force
-      real(wp) :: drive(0:2), series(0:max_order), offset, step, gap
-      integer :: order, term, kept
+      real(wp) :: shown(0:max_order)
+      integer :: kept
+
+      call limit_horizon(self, block, kept)
+      call expand_to(self, block, kept)
+      self%block(block)%exceeds = self%blocks > 1
+      if (.not. self%block(block)%exceeds) return
+      shown(:self%order) = self%published(block, :self%order)
+      call move(shown, self%order, self%moment(block), kept)
+      self%excess(:kept, block) = self%own(:kept, block) - shown(:kept)
+   end subroutine expand
+
+   !> Publish the motion of a block: the same up to the end of the step.
+   subroutine expand_published(self, block)
+      class(row_state_type), intent(inout) :: self
+      integer, intent(in) :: block
+
+      real(wp) :: shown(0:max_order)
+      integer :: kept
+
+      call expand_to(self, block, self%order)
+      shown(:self%order) = self%own(:self%order, block)
+      call move(shown, self%order, -self%moment(block), self%order)
+      self%published(block, :self%order) = shown(:self%order)
+      self%block(block)%exceeds = .false.
+      call limit_horizon(self, block, kept)
+      self%block(block)%own_order = kept
+   end subroutine expand_published
+
+   !> The order of a block's motion up to about its next event, and until when it is exact.
+   subroutine limit_horizon(self, block, kept)
+      class(row_state_type), intent(inout) :: self
+      integer, intent(in) :: block
+      integer, intent(out) :: kept
+
+      real(wp) :: step, gap
+      integer :: order
 
       step = self%length - self%moment(block)
       self%horizon(block) = self%length
-      kept = self%order
-      if (.not. is_whole) then
-         if (self%speed(block) > 0.0_wp) then
-            gap = self%block(block)%window%upper - self%place(block)
-         else
-            gap = self%place(block) - self%block(block)%window%lower
-         end if
-         if (gap < 0.5_wp * abs(self%speed(block)) * step .and. gap > 0.0_wp) then
-            ! Not so short that time would stand still.
-            step = max(2.0_wp * gap / abs(self%speed(block)), rounding * self%length)
-            self%horizon(block) = self%moment(block) + step
-         end if
-         do order = min_order, self%order
-            if (self%rate * step <= self%reach(order)) then
-               kept = order
-               exit
-            end if
-         end do
+      if (self%speed(block) > 0.0_wp) then
+         gap = self%block(block)%window%upper - self%place(block)
+      else
+         gap = self%place(block) - self%block(block)%window%lower
       end if
+      if (gap < 0.5_wp * abs(self%speed(block)) * step .and. gap > 0.0_wp) then
+         ! Not so short that time would stand still.
+         step = max(2.0_wp * gap / abs(self%speed(block)), rounding * self%length)
+         self%horizon(block) = self%moment(block) + step
+      end if
+      kept = self%order
+      do order = min_order, self%order
+         if (self%rate * step <= self%reach(order)) then
+            kept = order
+            exit
+         end if
+      end do
+   end subroutine limit_horizon
 
-      order = self%order
-      around(:order) = neighbour_motion(self, block, order)
-      shown(:order) = self%published(block, :order)
-      call move(around, order, self%moment(block), kept)
-      call move(shown, order, self%moment(block), kept)
+   !> Motion of a block since its own time up to an order.
+   subroutine expand_to(self, block, kept)
+      class(row_state_type), intent(inout) :: self
+      integer, intent(in) :: block, kept
+
+      real(wp) :: around(0:max_order), damper, stiffness, drag, force
+      real(wp) :: drive(0:2), series(0:max_order), offset
+      integer :: term
+
+      around(:self%order) = neighbour_motion(self, block, self%order)
+      call move(around, self%order, self%moment(block), kept)
       drive = drive_at(self, self%moment(block))
       associate (law => self%block(block)%law)
          stiffness = self%neighbours(block) * self%bond + self%pull(block) &
@@ -169,13 +207,11 @@ contains
             self%own_damper(term + 1, block) = damper
          end do
          self%own(:kept, block) = series(:kept)
-         self%excess(:kept, block) = series(:kept) - shown(:kept)
          self%bend(block) = series(2)
       end associate
       if (self%viscosity > 0.0_wp) self%around(:kept, block) = around(:kept)
       self%block(block)%own_order = kept
       self%block(block)%is_own = .true.
-      self%block(block)%exceeds = self%blocks > 1
-   end subroutine expand
+   end subroutine expand_to
 
 end module mesoslip_sliders_interface_series

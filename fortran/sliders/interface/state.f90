@@ -78,6 +78,7 @@ module mesoslip_sliders_interface_state
       !> Spring and damping between neighbours, spring to the drive, over the mass of a block
       real(wp) :: bond = 0.0_wp, viscosity = 0.0_wp
       real(wp), allocatable :: pull(:)
+      real(wp) :: max_pull = 0.0_wp
       !> Number of neighbours of each block; of one inside the row, which the poses of all blocks
       !> have, so that the contacts of blocks that move alike take the same steps
       real(wp), allocatable :: neighbours(:)
@@ -166,6 +167,7 @@ contains
          self%viscosity = self%neighbour_damping
          self%pull = self%top_stiffness / self%mass
          self%pull(1) = self%pull(1) + self%edge_stiffness / block_mass
+         self%max_pull = maxval(self%pull)
          self%inverse_mass = 1.0_wp / block_mass
       end associate
       self%cost = 1.0_wp + 0.25_wp * self%blocks

@@ -334,7 +334,9 @@ def _external_storage(library: ctypes.CDLL, file: int, name: bytes, target: byte
     space = handle(library.H5Screate_simple(1, size, None))
     made = handle(library.H5Pcreate(kind))
     library.H5Pset_external(made, target, ctypes.c_int64(0), ctypes.c_uint64(32))
-    library.H5Dcreate2(file, name, number, space, handle(0), made, handle(0))
+    data = library.H5Dcreate2(file, name, number, space, handle(0), made, handle(0))
+    # A file with an open data set is not closed, and is written later.
+    library.H5Dclose(handle(data))
 
 
 def links(name: str, folder: Path) -> Report:

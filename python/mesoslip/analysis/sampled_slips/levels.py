@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -23,6 +24,8 @@ MIN_STEPS = 2.0
 WIDTHS = (1, 3, 5, 9, 17, 33, 65, 129, 257)
 # Maximum rate of loading over the median rate of rises: what rises beyond it is a rebound.
 MAX_LOADING = 1.5
+# Narrower medians by which the rate of loading is known as well.
+NARROWER = 2
 # Minimum depth of a slip over the rebound before it.
 MIN_FALL_RATIO = 2.0
 # Minimum rate of a slip over that of the deepest fall.
@@ -51,6 +54,8 @@ class Side:
     floor: float
     min_size: float
     """Minimum fall for which extremes are asked for."""
+    narrower: tuple[float, ...] = ()
+    """Rates of its rises after some narrower medians [N/s]: wide ones flatten what is between."""
     original: Side | None = None
     """The trace, of a mirror image."""
     _falls: dict[float, tuple[Samples, Samples]] = field(init=False, default_factory=dict)
@@ -157,11 +162,16 @@ class Side:
             durations.append(abs(float(time[top + way * low] - time[top + way * high])))
         return min(MAX_RATIO, durations[0] / durations[1])
 
-    @cached_property
+    @property
     def _rising(self) -> float:
-        """Rate of the rises between deep falls, the median over time [N/s]."""
+        """Rate of loading [N/s]."""
         if self.original is not None:
             return self.original._rising
+        return max(self.rising, *self.narrower, 0.0) if math.isfinite(self.rising) else math.inf
+
+    @cached_property
+    def rising(self) -> float:
+        """Rate of the rises between deep falls, the median over time [N/s]."""
         if self.loading_rate is not None and self.loading_rate > 0:
             return self.loading_rate
         tops, bottoms = self.extremes.falls(self.floor)
@@ -241,6 +251,7 @@ def levels(
         white, step = noise.deviation, noise.digital_step
     else:
         white, step = noise, 0.0
+    rising: deque[float] = deque(maxlen=NARROWER)
     for width in WIDTHS:
         if width > 1 and (
             width > len(force) // 8 or (period is not None and width * interval > period / 4)
@@ -258,8 +269,10 @@ def levels(
         )
         # The rate of loading is that between falls of half the typical size.
         min_size = min(floor / 2, min_fall)
-        trace = Side(time, filtered, loading_rate, period, floor, min_size)
+        trace = Side(time, filtered, loading_rate, period, floor, min_size, tuple(rising))
         yield Level(parts, width * interval, floor, trace, slope)
+        if math.isfinite(trace.rising):
+            rising.append(trace.rising)
         if noise_range <= height and not isinstance(noise, TraceNoise):
             return
 

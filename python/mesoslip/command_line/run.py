@@ -109,8 +109,8 @@ def run(
             if not checkpoint.is_written:
                 raise
             raise NoMemoryError(
-                f"{error}; what was computed is in {folder}: the same command with --resume "
-                "continues, where there is more memory"
+                f"{error}; the results so far are in {folder}: with more memory, the same command "
+                "with --resume continues"
             ) from error
         if not results.complete:
             raise typer.Exit(_keep(results, path, stop, checkpoint))

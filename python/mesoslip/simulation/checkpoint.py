@@ -290,7 +290,7 @@ class Checkpoint:
         try:
             self._append(waiting)
         except BaseException:
-            # What is in no file still waits.
+            # Rows that are in no file still wait.
             with self._lock:
                 for one in realizations:
                     self._count_waiting(one)

@@ -75,7 +75,7 @@ def b_value(sizes: Array, completeness: float | None = None) -> BValue | None:
     every = _with_detection(magnitude)
     found = _fit(magnitude, every.completeness)
     if found is None or (found.count < MIN_COMPLETE and found.p_value >= REJECTED):
-        # An infinite error: detection and law are not told apart.
+        # With an infinite error the events do not tell the law from the detection.
         return every if math.isfinite(every.error) else None
     while found.p_value < REJECTED:
         # The detection of events is no such distribution, or they follow no such law.

@@ -55,7 +55,7 @@ class Side:
     min_size: float
     """Minimum fall for which extremes are asked for."""
     narrower: tuple[float, ...] = ()
-    """Rates of its rises after some narrower medians [N/s]: wide ones flatten what is between."""
+    """Rates of rises after narrower medians [N/s]: wide ones flatten those between small slips."""
     original: Side | None = None
     """The trace, of a mirror image."""
     _falls: dict[float, tuple[Samples, Samples]] = field(init=False, default_factory=dict)
@@ -129,10 +129,10 @@ class Side:
         if self.period is not None:
             duration = 0.5 * REBOUND * self.period
         first = max(low, int(np.searchsorted(time, time[top] - duration)))
-        if math.isinf(self._rising):
+        if math.isinf(self._loading):
             return 0.0
         since = slice(first, top + 1)
-        loading = MAX_LOADING * self._rising * (time[top] - time[since])
+        loading = MAX_LOADING * self._loading * (time[top] - time[since])
         rise = float(np.max(self.force[top] - self.force[since] - loading))
         return max(rise - self.floor / 2, 0.0)
 
@@ -163,11 +163,11 @@ class Side:
         return min(MAX_RATIO, durations[0] / durations[1])
 
     @property
-    def _rising(self) -> float:
-        """Rate of loading [N/s]."""
+    def _loading(self) -> float:
+        """Rate of loading [N/s]; infinite if it is not known."""
         if self.original is not None:
-            return self.original._rising
-        return max(self.rising, *self.narrower, 0.0) if math.isfinite(self.rising) else math.inf
+            return self.original._loading
+        return max(self.rising, *self.narrower, 0.0)
 
     @cached_property
     def rising(self) -> float:

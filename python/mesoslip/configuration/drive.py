@@ -6,41 +6,27 @@ part has the number of its stage.
 
 from __future__ import annotations
 
-import itertools
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from functools import cached_property
-from pathlib import Path
-from typing import Annotated, Any, Literal, NamedTuple, Self
+from typing import Annotated, Literal, NamedTuple, Self
 
 from pydantic import Field, StrictBool, model_validator
 
-from mesoslip.configuration.columns import Quantity, cells_of, find_columns, values_of
-from mesoslip.configuration.reading import text_of
+from mesoslip.configuration.columns import Quantity
+from mesoslip.configuration.history import MAX_PARTS, History
 from mesoslip.configuration.table import (
     ForceRate,
     Length,
     MeasuredLength,
-    MeasuredTime,
     Rate,
     SignedForce,
     Table,
-    Text,
     Time,
     Velocity,
     Whole,
     problem,
 )
-from mesoslip.errors import FileError
-
-# Maximum number of parts of a drive.
-MAX_PARTS = 1_000_000
-
-# Columns of a measured history.
-COLUMNS = {
-    "time": Quantity("time", "s", "time [s]"),
-    "displacement": Quantity("displacement", "m", "displacement [um]"),
-}
 
 
 class DrivePart(NamedTuple):
@@ -251,43 +237,18 @@ class Cycle(Table):
             yield DrivePart(distance / self.speed, velocity, velocity, number)
 
 
-class History(Table):
+class DriveHistory(History):
     """A measured history of the drive: its displacement at given times, with straight lines between
     them. Outputs keep the points, not the name of the file."""
 
-    file: Text | None = None
-    """A CSV file with the columns time and displacement, relative to the configuration."""
-    time: tuple[MeasuredTime, ...] | None = None
-    """Times of the points, instead of a file."""
+    what = "the drive"
+    quantity = Quantity("displacement", "m", "displacement [um]")
+
     displacement: tuple[MeasuredLength, ...] | None = None
     """Displacements of the drive at these times."""
 
-    @model_validator(mode="before")
-    @classmethod
-    def _read(cls, values: Any) -> Any:
-        if not isinstance(values, Mapping) or not isinstance(values.get("file"), str):
-            return values
-        if values.keys() & COLUMNS.keys():
-            raise problem("file", "give either a file, or time and displacement")
-        try:
-            points = read_history(Path(values["file"]), COLUMNS, "a history of the drive")
-        except FileError as error:
-            raise problem("file", str(error)) from None
-        return {**{key: one for key, one in values.items() if key != "file"}, **points}
-
     @model_validator(mode="after")
     def _is_a_motion(self) -> Self:
-        if self.time is None or self.displacement is None:
-            raise problem("file", "missing; give a file, or time and displacement")
-        if len(self.time) != len(self.displacement):
-            raise problem("displacement", "must have as many values as time")
-        if len(self.time) < 2:
-            raise problem("time", "must have at least two values")
-        if len(self.time) > MAX_PARTS:
-            raise problem("time", f"has more than {MAX_PARTS} values")
-        for before, after in itertools.pairwise(self.time):
-            if not after > before:
-                raise problem("time", f"must increase; {after:g} s comes after {before:g} s")
         for part in self.parts():
             if part.max_speed > 3e8:
                 raise problem("displacement", f"moves at {part.max_speed:g} m/s")
@@ -295,34 +256,9 @@ class History(Table):
 
     def parts(self) -> Iterator[DrivePart]:
         """The straight lines between the points, all in one stage."""
-        points = zip(self.time or (), self.displacement or (), strict=True)
-        for (time, position), (next_time, next_position) in itertools.pairwise(points):
-            velocity = (next_position - position) / (next_time - time)
-            yield DrivePart(next_time - time, velocity, velocity, 0)
-
-
-def read_history(path: Path, columns: Mapping[str, Quantity], what: str) -> dict[str, list[float]]:
-    """Points of a measured history, ``what`` it is, in SI units from a file, see `columns`.
-
-    The first column must be ``time [s]``; the others may be anywhere.
-    """
-    cells = cells_of(text_of(path, what), str(path))
-    header = ",".join(one.header for one in columns.values())
-    wanted = f"the header must name the columns with units, such as {header}"
-    places = find_columns(cells.first, columns, str(path)) if cells.has_header else {}
-    for name in columns:
-        if name not in places:
-            raise FileError(f"{path}: there is no column {name}; {wanted}")
-    if places["time"].column != 0:
-        raise FileError(f"{path}: the first column must be the time")
-    if len(cells.lines) < 2:
-        raise FileError(f"{path}: must have at least two rows of numbers")
-    points = values_of(cells, cells.first, places)
-    times = itertools.pairwise(points["time"])
-    for (line, _), (before, after) in zip(cells.lines[1:], times, strict=True):
-        if not after > before:
-            raise FileError(f"{path}: line {line}: the time must increase from row to row")
-    return points
+        for duration, start, end in self.lines():
+            velocity = (end - start) / duration
+            yield DrivePart(duration, velocity, velocity, 0)
 
 
 class Drive(Table):
@@ -337,7 +273,7 @@ class Drive(Table):
     """Number of passes through the list of stages."""
     cycle: Cycle | None = None
     """An oscillating drive."""
-    history: History | None = None
+    history: DriveHistory | None = None
     """A measured motion of the drive."""
     force: SignedForce | None = None
     """Constant force on a slider of kind "force", from the start of the run."""

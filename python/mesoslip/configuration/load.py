@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple, Self
@@ -24,7 +24,7 @@ from mesoslip.configuration.columns import (
     cells_of,
     values_of,
 )
-from mesoslip.configuration.drive import MAX_PARTS, read_history
+from mesoslip.configuration.history import MAX_PARTS, History
 from mesoslip.configuration.kernel_parameters import Parameters
 from mesoslip.configuration.reading import text_of
 from mesoslip.configuration.table import (
@@ -32,12 +32,10 @@ from mesoslip.configuration.table import (
     Complaint,
     Complaints,
     Force,
-    MeasuredTime,
     Number,
     Rate,
     SignedForce,
     Table,
-    Text,
     Time,
     problem,
 )
@@ -46,11 +44,6 @@ from mesoslip.quantities import with_unit
 
 Array = NDArray[np.float64]
 
-# Columns of a measured history.
-COLUMNS = {
-    "time": Quantity("time", "s", "time [s]"),
-    "normal_force": Quantity("normal_force", "N", "normal force [N]"),
-}
 # Column of a profile along an interface.
 PROFILE_COLUMN = "normal_force"
 # End of the last part, which has none.
@@ -110,48 +103,19 @@ class LoadCycle(Table):
     """Phase at the start of the run [rad]."""
 
 
-class LoadHistory(Table):
+class LoadHistory(History):
     """A measured history of the load, with straight lines between its points, from the first of
     them on. Outputs keep the points, not the name of the file."""
 
-    file: Text | None = None
-    """A CSV file with the columns time and normal force, relative to the configuration."""
-    time: tuple[MeasuredTime, ...] | None = None
-    """Times of the points, instead of a file."""
+    what = "the load"
+    quantity = Quantity("normal_force", "N", "normal force [N]")
+
     normal_force: tuple[SignedForce, ...] | None = None
     """Normal forces at these times."""
 
-    @model_validator(mode="before")
-    @classmethod
-    def _read(cls, values: Any) -> Any:
-        if not isinstance(values, Mapping) or not isinstance(values.get("file"), str):
-            return values
-        if values.keys() & COLUMNS.keys():
-            raise problem("file", "give either a file, or time and normal_force")
-        try:
-            points = read_history(Path(values["file"]), COLUMNS, "a history of the load")
-        except FileError as error:
-            raise problem("file", str(error)) from None
-        return {**{key: one for key, one in values.items() if key != "file"}, **points}
-
-    @model_validator(mode="after")
-    def _has_points(self) -> Self:
-        if self.time is None or self.normal_force is None:
-            raise problem("file", "missing; give a file, or time and normal_force")
-        if len(self.time) != len(self.normal_force):
-            raise problem("normal_force", "must have as many values as time")
-        if not 2 <= len(self.time) <= MAX_PARTS:
-            raise problem("time", f"must have from 2 to {MAX_PARTS} values")
-        for before, after in itertools.pairwise(self.time):
-            if not after > before:
-                raise problem("time", f"must increase; {after:g} s comes after {before:g} s")
-        return self
-
     def parts(self) -> Iterator[LoadPart]:
         """The straight lines between the points."""
-        points = zip(self.time or (), self.normal_force or (), strict=True)
-        for (time, force), (next_time, next_force) in itertools.pairwise(points):
-            yield LoadPart(next_time - time, force, next_force)
+        return itertools.starmap(LoadPart, self.lines())
 
 
 class Load(Table):

@@ -12,7 +12,7 @@ import pytest
 from conftest import ROOT
 from kinds import KINDS, configuration
 from mesoslip import _core
-from mesoslip.configuration.contacts import tables as contacts
+from mesoslip.configuration.contacts.tables import ageing, contacts, interaction
 from mesoslip.configuration.sliders.layered import SOLVERS
 from mesoslip.configuration.threshold_laws import LAWS
 from mesoslip.errors import RunError
@@ -26,13 +26,13 @@ from mesoslip.theory.lives import Scales
 from mesoslip.theory.slip_onset import EQUATIONS, Onset
 
 NAMES = {
-    "ageing_laws": contacts.AGEING_LAWS,
+    "ageing_laws": ageing.AGEING_LAWS,
     "couplings": contacts.COUPLINGS,
     "delay_laws": contacts.DELAY_LAWS,
     "endings": tuple(ENDINGS)[1:],
     "equations": EQUATIONS,
     "initial_states": contacts.INITIAL_STATES,
-    "lattices": contacts.LATTICES,
+    "lattices": interaction.LATTICES,
     "onset": tuple(one.name for one in fields(Onset))[:4],
     "scales": Scales._fields,
     "solvers": SOLVERS,

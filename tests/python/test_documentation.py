@@ -30,7 +30,7 @@ from mesoslip.analysis.regime.result import REGIME
 from mesoslip.campaign.measures import MEASURES
 from mesoslip.campaign.sweep_plan import Plan
 from mesoslip.command_line.main import app
-from mesoslip.configuration.contacts.tables import COUPLINGS, INITIAL_STATES
+from mesoslip.configuration.contacts.tables.contacts import COUPLINGS, INITIAL_STATES
 from mesoslip.configuration.sliders import DEFAULT as DEFAULT_SLIDER
 from mesoslip.configuration.sliders import SLIDERS
 from mesoslip.configuration.threshold_laws import LAWS

@@ -18,7 +18,7 @@ from conftest import ROOT
 from kinds import KINDS as RUNS
 from kinds import configuration
 from mesoslip.configuration import contacts
-from mesoslip.configuration.contacts.tables import Contacts
+from mesoslip.configuration.contacts.tables.contacts import Contacts
 from mesoslip.configuration.sliders import SLIDERS
 from mesoslip.configuration.threshold_laws import LAWS
 from scipy.sparse import csgraph

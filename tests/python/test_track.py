@@ -8,7 +8,7 @@ import mesoslip
 import numpy as np
 import pytest
 from mesoslip import Config, ConfigError, SteadySliding, TrackResponse, track_strength
-from mesoslip.configuration.contacts.tables import Track
+from mesoslip.configuration.contacts.tables.track import Track
 from oracles import relative_strength, stationary_force
 
 CORRELATIONS = {

@@ -15,7 +15,7 @@ from conftest import ROOT
 
 # A key that is in the configuration alone; with KIND, contacts of one engine that say they know it.
 PLANT = """
-import mesoslip.configuration.contacts.tables as tables
+import mesoslip.configuration.contacts.tables.contacts as tables
 
 class Contacts(tables.Contacts):
     softening: tables.Number | None = None

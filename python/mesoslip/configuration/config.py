@@ -19,7 +19,8 @@ from pydantic_core import PydanticCustomError
 from mesoslip.configuration import arguments, checks
 from mesoslip.configuration.contacts import contact_kind, is_in_both_engines
 from mesoslip.configuration.contacts.base import COMMON_KEYS, ContactKind, given_keys
-from mesoslip.configuration.contacts.tables import Contacts, Interaction
+from mesoslip.configuration.contacts.tables.contacts import Contacts
+from mesoslip.configuration.contacts.tables.interaction import Interaction
 from mesoslip.configuration.drive import Drive, DrivePart
 from mesoslip.configuration.files import (
     Change,

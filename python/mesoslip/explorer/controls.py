@@ -7,14 +7,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from mesoslip.configuration.config import Config
-from mesoslip.configuration.contacts.tables import (
-    BOLTZMANN,
-    CORRELATIONS,
-    COUPLINGS,
-    INITIAL_STATES,
-    LATTICES,
-    RENEWALS,
-)
+from mesoslip.configuration.contacts.tables.contacts import COUPLINGS, INITIAL_STATES, RENEWALS
+from mesoslip.configuration.contacts.tables.interaction import LATTICES
+from mesoslip.configuration.contacts.tables.thermal import BOLTZMANN
+from mesoslip.configuration.contacts.tables.track import CORRELATIONS
 from mesoslip.configuration.differences import flat
 from mesoslip.configuration.keys import key_kind
 from mesoslip.configuration.meanings import meaning

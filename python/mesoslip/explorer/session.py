@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from mesoslip.configuration.config import Config
-from mesoslip.configuration.contacts.tables import LATTICES
+from mesoslip.configuration.contacts.tables.interaction import LATTICES
 from mesoslip.configuration.differences import text_of
 from mesoslip.configuration.sliders import SLIDERS
 from mesoslip.errors import ConfigError, FileError, MesoslipError, Problem

@@ -11,7 +11,10 @@ from functools import singledispatch
 from typing import TYPE_CHECKING
 
 from mesoslip.configuration.config import Config
-from mesoslip.configuration.contacts.tables import Ageing, Interaction, Thermal, Track
+from mesoslip.configuration.contacts.tables.ageing import Ageing
+from mesoslip.configuration.contacts.tables.interaction import Interaction
+from mesoslip.configuration.contacts.tables.thermal import Thermal
+from mesoslip.configuration.contacts.tables.track import Track
 from mesoslip.configuration.drive import Drive
 from mesoslip.configuration.keys import key_kind
 from mesoslip.configuration.load import Load

@@ -10,7 +10,7 @@ from mesoslip.configuration.contacts.base import COMMON_KEYS, ContactKind
 from mesoslip.configuration.contacts.ensemble import EnsembleContacts
 from mesoslip.configuration.contacts.lattice import LatticeContacts
 from mesoslip.configuration.contacts.populations import PopulationContacts
-from mesoslip.configuration.contacts.tables import Interaction
+from mesoslip.configuration.contacts.tables.interaction import Interaction
 from mesoslip.configuration.contacts.thermal import (
     ThermalAgeingContacts,
     ThermalAgeingPopulations,

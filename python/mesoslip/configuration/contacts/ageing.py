@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from mesoslip.configuration.contacts.base import ContactKind, Setting, common_parameters
 from mesoslip.configuration.contacts.populations import PopulationContacts
-from mesoslip.configuration.contacts.tables import Ageing
+from mesoslip.configuration.contacts.tables.ageing import Ageing
 from mesoslip.configuration.kernel_parameters import Parameters
 from mesoslip.configuration.table import Complaint, Complaints
 

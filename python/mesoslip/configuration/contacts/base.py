@@ -10,7 +10,8 @@ from typing import Any, ClassVar, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from mesoslip.configuration.contacts.tables import Contacts, Interaction
+from mesoslip.configuration.contacts.tables.contacts import Contacts
+from mesoslip.configuration.contacts.tables.interaction import Interaction
 from mesoslip.configuration.kernel_parameters import Parameters
 from mesoslip.configuration.load import Load
 from mesoslip.configuration.run_tables import Run

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from mesoslip.configuration.contacts.base import ContactKind, Setting, common_parameters
-from mesoslip.configuration.contacts.tables import Interaction
+from mesoslip.configuration.contacts.tables.interaction import Interaction
 from mesoslip.configuration.kernel_parameters import Parameters
 from mesoslip.configuration.table import Complaints
 

@@ -10,18 +10,18 @@ import numpy as np
 from mesoslip.configuration.contacts.ageing import age_problems, ageing_of
 from mesoslip.configuration.contacts.base import ContactKind, Setting, common_parameters
 from mesoslip.configuration.contacts.populations import PopulationContacts
-from mesoslip.configuration.contacts.tables import (
-    MAX_IDLE_BREAKS,
-    MAX_IDLE_DELAY,
-    Contacts,
-    Thermal,
-)
+from mesoslip.configuration.contacts.tables.contacts import Contacts
+from mesoslip.configuration.contacts.tables.thermal import Thermal
 from mesoslip.configuration.kernel_parameters import Parameters
 from mesoslip.configuration.table import Complaint, Complaints
 
 # Ages of the life of a contact that bears the back force: the first over the scales of time, and
 # their number; exponent beyond which a rate is infinite.
 MIN_AGE, AGES, MAX_EXPONENT = 1e-3, 400, 500.0
+# Maximum number of times that a contact breaks in a run without bearing more than the back force.
+MAX_IDLE_BREAKS = 1e9
+# Maximum delay relative to the mean life of such a contact.
+MAX_IDLE_DELAY = 1e6
 
 
 def thermal_of(config: Setting) -> Thermal:

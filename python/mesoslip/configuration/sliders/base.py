@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip.configuration.contacts.base import ContactKind
-from mesoslip.configuration.contacts.tables import Contacts
+from mesoslip.configuration.contacts.tables.contacts import Contacts
 from mesoslip.configuration.drive import Drive
 from mesoslip.configuration.load import Load
 from mesoslip.configuration.run_tables import Output

@@ -92,9 +92,13 @@ def test_info(command):
     assert status == 0
     assert json.loads(out)["omega_s"] == pytest.approx(256.88, rel=1e-4)
     status, out, _ = command(
-        "info", ROOT / "runs" / "klein.toml", "--all", "--set", "slider.mass=1kg"
+        "info",
+        *(ROOT / "runs" / "klein.toml", "--all", "--set", "slider.mass=1kg"),
+        *("--set", "output.slip_interval=10ps"),
     )
     assert "setup frequency" in out
+    # A machine that cannot run it can still describe it.
+    assert "output.slip_interval = 1e-11: the run may need" in out
 
 
 def test_info_prints_the_overview_first(short, tmp_path, command):

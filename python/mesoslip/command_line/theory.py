@@ -49,6 +49,7 @@ def info(
 
     Without --all only the first few quantities are printed; JSON has all that are derived.
     """
+    from mesoslip.simulation.memory import memory_problems
     from mesoslip.theory.derived import derived, overview, verdict
 
     checked = load(config, changes)
@@ -70,6 +71,7 @@ def info(
         *checked.notes,
         checked.unreachable_stop,
         checked.contacts.weak_track,
+        *map(str, memory_problems(checked)),
     ):
         if message is not None:
             typer.echo(message)

@@ -61,6 +61,13 @@ def check_memory(config: Config, available: float | None = None) -> None:
 
     The `ConfigError` names each key that needs too much.
     """
+    problems = memory_problems(config, available)
+    if problems:
+        raise ConfigError(problems)
+
+
+def memory_problems(config: Config, available: float | None = None) -> list[Problem]:
+    """The keys by which a record exceeds the available memory [bytes]."""
     run, output, contacts = config.run, config.output, config.contacts
     memory = machine_memory() if available is None else available
     owner = "the machine has" if available is None else "it may take"
@@ -98,8 +105,7 @@ def check_memory(config: Config, available: float | None = None) -> None:
                 f"{memory / 2**30:.3g} GiB"
             )
             problems.append(Problem("", key, message, value))
-    if problems:
-        raise ConfigError(problems)
+    return problems
 
 
 def _breaks(config: Config) -> float:

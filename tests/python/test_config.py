@@ -459,6 +459,11 @@ def test_round_trip(klein):
     assert Config.from_toml(config.to_toml()) == config
 
 
+def test_the_name_of_a_file_is_no_text():
+    with pytest.raises(ConfigError, match=r"Config\.load reads"):
+        Config.from_toml("runs/klein.toml")
+
+
 def test_every_run_in_the_tree_is_valid():
     for path in (ROOT / "runs").glob("*.toml"):
         Config.load(path)

@@ -37,7 +37,7 @@ from mesoslip.configuration.reading import PathLike, as_path
 from mesoslip.configuration.run_tables import Curve, Output, Run
 from mesoslip.configuration.sliders import Slider
 from mesoslip.configuration.table import Complaint, Table, Text
-from mesoslip.errors import ConfigError
+from mesoslip.errors import ConfigError, Problem
 from mesoslip.quantities import with_unit
 
 # Default number of finer samples in a period of the ringing on the pinned contacts, and in a delay.
@@ -419,6 +419,9 @@ class Config(Table):
         ``base`` is the text of the configuration that it is based on, if there are no changes.
         Both are of an output and must not name files; changes may.
         """
+        if text.endswith(".toml") and "\n" not in text:
+            message = "is the name of a file, which Config.load reads, not a text in TOML"
+            raise ConfigError([Problem(source, "", message)])
         tables, overrides = parse_toml(text, source), tuple(overrides)
         below = None if base is None else parse_toml(base, source)
         for one in (tables, below or {}):

@@ -53,6 +53,7 @@ html_theme = "furo"
 html_title = "mesoslip"
 html_static_path = ["_static"]
 html_css_files = ["mesoslip.css"]
+html_js_files = [("mesoslip.js", {"defer": "defer"})]
 html_copy_source = False
 html_show_sphinx = False
 

@@ -14,6 +14,7 @@ from commands import FILES, RUNS, SOURCE
 from conftest import ROOT, klein_tables, long
 from kinds import configuration
 from matplotlib.figure import Figure
+from mesoslip.analysis.response import Line
 from mesoslip.command_line.view_summaries import summaries
 from mesoslip.configuration.config import Config
 from mesoslip.output import files
@@ -29,6 +30,7 @@ from mesoslip.plots.style import curve_style, styled
 from mesoslip.plots.sweep_panels import CHOICE_COLORS
 from mesoslip.plots.views import VIEWS, names_of_views
 from mesoslip.plots.views.layers import layer_motion
+from mesoslip.plots.views.response import _slope
 from mesoslip.simulation.run_realizations import run_realizations
 from pictures import MOVIES, PICTURES
 
@@ -69,6 +71,37 @@ def test_a_lattice_has_no_empty_space_beside_it(old, width):
     for axes in figure.axes[: len(figure.axes) // 2]:
         room, drawn = axes.get_position(original=True), axes.get_position()
         assert drawn.width * drawn.height > 0.8 * room.width * room.height
+
+
+@pytest.fixture(scope="module")
+def short():
+    """A short run of few contacts."""
+    return mesoslip.run(klein_tables(contacts__count=10, run__duration=0.1))
+
+
+def test_outputs_whose_clocks_do_not_overlap_are_compared_from_their_starts(short):
+    late = short.copy()
+    late["time"] = short["time"] + 60.0
+    force = mesoslip.plot([short, late]).axes[0]
+    early, moved = (one.get_xdata() for one in force.lines)
+    assert np.allclose(early, moved, atol=1e-9)
+    assert force.get_xlim()[1] == pytest.approx(early[-1])
+    late["time"] = short["time"] + 0.05
+    early, moved = (one.get_xdata() for one in mesoslip.plot([short, late]).axes[0].lines)
+    assert np.allclose(moved - early, moved[0] - early[0])
+    assert moved[0] > early[0]
+
+
+def test_contacts_that_never_wait_have_no_panel(short):
+    assert len(mesoslip.plot(short).axes) == 3
+    at_once = klein_tables(contacts__count=10, contacts__delay=0.0, run__duration=0.1)
+    names = [one.get_ylabel() for one in mesoslip.plot(mesoslip.run(at_once)).axes]
+    assert [name.split(" (")[0] for name in names] == ["spring force", "velocity"]
+
+
+def test_a_slope_without_noise_has_no_error():
+    shown = [_slope(Line(-0.095226765, error, 1.2, 0.0, 0), 1.0) for error in (4.8e-8, 2e-4)]
+    assert shown == ["-0.09523", "-0.09523 ± 0.00020"]
 
 
 @pytest.fixture(scope="module")

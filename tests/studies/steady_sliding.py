@@ -325,8 +325,8 @@ def draw_map(file: str) -> None:
         panel.set(xlabel="delay, ms", ylabel="stiffness K, N/m", title=f"{1e6 * velocity:g} µm/s")
     for number, name in enumerate(("smooth", "stick-slip", "irregular", "transient")):
         axes[0].plot([], [], MARKERS[number], color=COLOURS[number], label=name)
-    axes[0].plot([], [], "--", color="tab:red", label="the same, dephased")
     axes[0].fill_between([], [], color="tab:red", alpha=0.15, label="steady sliding unstable")
+    axes[0].plot([], [], "--", color="tab:red", label="the same, dephased contacts")
     figure.legend(loc="outside lower center", ncols=6)
     figure.savefig(file, dpi=110)
 

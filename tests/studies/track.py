@@ -77,7 +77,7 @@ def spectrum(axes):
     shown = (q > 0) & (q < 25)
     axes.semilogy(q[shown], density[shown], "C0", lw=0.6, label=f"{TRACKS} tracks, N → ∞")
     axes.semilogy(q[shown], theory.force_spectrum(q[shown]), "k--", lw=1, label="linear theory")
-    axes.set(xlabel="wavenumber × breaking stretch", ylabel="spectrum of F/F_s")
+    axes.set(xlabel="wavenumber × breaking stretch", ylabel="spectrum of $F/F_s$")
     axes.legend(fontsize=7)
     print(f"deviation {np.std(force - 0.505):.4f}, theory {theory.force_deviation:.4f}")
 
@@ -91,7 +91,7 @@ def loops(axes):
         x, force = (tree[name].values[0] for name in ("displacement", "contact_force"))
         slipped = force - config.contacts.stiffness * x
         axes.plot(1e9 * x, 1e6 * slipped, colour, lw=0.8, label=label)
-    axes.set(xlabel="displacement (nm)", ylabel="force less N k X (µN)")
+    axes.set(xlabel="displacement (nm)", ylabel="force less $NkX$ (µN)")
     axes.legend(fontsize=7)
 
 

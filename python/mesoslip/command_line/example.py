@@ -25,8 +25,10 @@ def example(
     from mesoslip import examples
 
     if name is None:
-        for known, title in examples.examples().items():
-            typer.echo(f"{known:14} {title}")
+        titles = examples.examples()
+        width = max(map(len, titles))
+        for known, title in titles.items():
+            typer.echo(f"{known:{width}}  {title}")
         return
     for written in examples.example(name, file):
         typer.echo(str(written), err=True)

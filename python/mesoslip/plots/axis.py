@@ -28,6 +28,12 @@ class HorizontalAxis:
     label: str
     limits: tuple[float, float] | None
     origin: float = 0.0
+    starts: tuple[float, ...] = ()
+    """What each of several outputs counts its time from, where their times do not overlap [s]."""
+
+    def start(self, number: int) -> float:
+        """Time that counts as 0 for one of several outputs [s]."""
+        return self.starts[number] if self.starts else 0.0
 
     def prepare(self, axes: Axes) -> None:
         """Set the label and the limits of axes."""
@@ -51,12 +57,17 @@ def horizontal_axis(trees: Sequence[Tree], extent: Extent) -> HorizontalAxis:
             for tree, window in zip(trees, windows, strict=True)
         ]
         return HorizontalAxis(scale_for(max_size(*lines), UNITS[name]), label, None)
+    starts: tuple[float, ...] = ()
+    if windows[:, 0].max() > windows[:, 1].min():
+        # A record whose clock ran before it, and a run: each from its start.
+        starts, label = tuple(windows[:, 0].tolist()), "time from each start"
+        windows = windows - windows[:, :1]
     low, high = float(windows[:, 0].min()), float(windows[:, 1].max())
     # The clock of an instrument may be at hours when a trace of seconds starts.
     is_late = low > high - low and high > LATE
     scale = scale_for(high - low if is_late else max_size(windows), "s")
     limits = (low / scale.size, high / scale.size) if high > low else None
-    return HorizontalAxis(scale, label, limits)
+    return HorizontalAxis(scale, label, limits, starts=starts)
 
 
 def time_since(window: tuple[float, float]) -> HorizontalAxis:

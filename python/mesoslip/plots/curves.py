@@ -29,6 +29,10 @@ class Curve(NamedTuple):
     y: Array
     style: dict[str, Any]
 
+    def after(self, start: float) -> Curve:
+        """The curve with its horizontal axis from a start on."""
+        return self._replace(x=self.x - start)
+
 
 def curve(tree: Tree, name: str, extent: Extent, **style: Any) -> Curve:
     """The curve of a variable of a run."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mesoslip.configuration.units import from_cf_units
-from mesoslip.output.access import is_measured
+from mesoslip.output.access import config_of, is_measured
 from mesoslip.output.arrays import Tree
 from mesoslip.output.variables import LOADED, TRACE
 
@@ -26,9 +26,15 @@ UNITS["time"] = "s"
 def is_known(tree: Tree, name: str) -> bool:
     """Whether an output has values of a variable of the trace; a measured trace may lack some."""
     if not is_measured(tree):
-        return True
+        return name != "detached_contacts" or _waits(tree)
     # Files of earlier versions have variables without values.
     return name in tree.data_vars and bool(np.isfinite(tree.to_dataset()[name][0].values).any())
+
+
+def _waits(tree: Tree) -> bool:
+    """Whether contacts of a run stay detached for a time."""
+    contacts = config_of(tree).contacts
+    return contacts.delay > 0 or not contacts.reattach
 
 
 def force_of(tree: Tree) -> str:

@@ -68,7 +68,7 @@ def _enlarge_start(axes: Axes, solutions: Sequence[_Solution]) -> None:
         return
     end, depth = ENLARGED * early[0].times[-1], ENLARGED * np.ptp(early[0].drop)
     time, force = scale_for(end, "s"), scale_for(depth, "N")
-    inset = axes.inset_axes((0.56, 0.6, 0.42, 0.3))
+    inset = axes.inset_axes((0.66, 0.6, 0.34, 0.3))
     for one in solutions:
         style = EQUATIONS[one.equation] | {"label": None}
         inset.plot(one.times / time.size, one.drop / force.size, **style)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from mesoslip.analysis.experiment_stages import Experiment
 from mesoslip.analysis.rate_and_state import MAX_MISFIT, Fit, fit_laws, records_of
-from mesoslip.analysis.response import healing_line, response_of, steady_line
+from mesoslip.analysis.response import Line, healing_line, response_of, steady_line
 from mesoslip.errors import RunError
 from mesoslip.output.arrays import Arrays, Tree
 from mesoslip.plots.forced_response import draw_forced
@@ -23,6 +23,9 @@ from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import Scale, percent, scale_for, with_error, with_unit
 
 Array = NDArray[np.float64]
+
+# Relative error of a slope below which the motion has no noise, as that of N → ∞.
+NOISELESS = 1e-5
 
 
 def _draw_fit(axes: Axes, experiment: Experiment, found: Fit, scale: Scale) -> None:
@@ -85,7 +88,7 @@ def draw_steady(axes: Axes, data: Arrays) -> None:
     if found is not None:
         ends = np.array([x.min(), x.max()])
         values = (found.level + found.slope * (ends + math.log(reference))) * scale
-        slope = with_error(found.slope * scale, found.slope_error * scale)
+        slope = _slope(found, scale)
         if np.unique(velocity).size > 2:
             axes.plot(ends, values, color=RED)
         else:
@@ -106,10 +109,17 @@ def draw_healing(axes: Axes, data: Arrays) -> None:
     if found is not None:
         ends = np.array([hold.min(), hold.max()])
         axes.plot(ends, (found.level + found.slope * np.log10(ends)) * scale, color=RED)
-        slope = with_error(found.slope * scale, found.slope_error * scale)
+        slope = _slope(found, scale)
         write_title(axes, f"healing per decade of hold time = {slope}")
     axes.set_xlabel("hold time (s)")
     axes.set_ylabel("(peak - steady force) over $F_s$")
+
+
+def _slope(found: Line, scale: float) -> str:
+    """The slope of a line with its error, which is left out where it is far below what a motion
+    without noise can tell."""
+    value, error = found.slope * scale, found.slope_error * scale
+    return with_error(value, error if error > NOISELESS * abs(value) else 0.0)
 
 
 def _scale(data: Arrays, name: str) -> float:

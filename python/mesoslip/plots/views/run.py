@@ -180,7 +180,7 @@ def _compare(
             **curve_style(number),
             alpha=0.8,
             zorder=1.9 if is_measured(tree) else 2.0,
-        )
+        ).after(horizontal.start(number))
         for number, (tree, one, label) in enumerate(zip(trees, names, labels, strict=True))
         if name is None or is_known(tree, name)
     ]

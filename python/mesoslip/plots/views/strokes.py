@@ -16,7 +16,17 @@ from mesoslip.analysis.strokes import (
 )
 from mesoslip.output.arrays import Tree
 from mesoslip.plots.printing import is_narrow
-from mesoslip.plots.style import BLUE, POINTS, RED, Canvas, canvas, legend_above, titles
+from mesoslip.plots.style import (
+    BLUE,
+    POINTS,
+    RED,
+    Canvas,
+    axes_height,
+    canvas,
+    legend_above,
+    titles,
+    wrapped,
+)
 from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import Scale, scale_for
 
@@ -110,7 +120,7 @@ def _draw_map(axes: Axes, found: Strokes, one: FrictionMap, limits: tuple[float,
         rasterized=True,
     )
     axes.set_xlabel(found.records[0].singular)
-    axes.set_ylabel(label)
+    axes.set_ylabel(wrapped(label, axes_height(axes)))
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.figure.colorbar(drawn, ax=axes, label=scale.label(name))
 

@@ -175,6 +175,20 @@ def test_contacts_that_attach_again_are_refused():
         SteadyFront(Config.load(RUN).replace({"contacts.reattach": True}))
 
 
+@pytest.mark.parametrize(
+    ("key", "table"),
+    [
+        ("contacts.thermal", {"rate": 1e4, "force_ratio": 0.05}),
+        ("contacts.ageing", {"law": "log", "time": 1e-4, "growth": 0.03}),
+        ("contacts.track", {"spread": 0.2, "length": 0.1}),
+    ],
+)
+def test_contacts_without_one_strength_are_refused(key, table):
+    config = Config.load(RUN).replace({key: table})
+    with pytest.raises(ConfigError, match=f"{key}: has no theory of steady fronts"):
+        SteadyFront(config)
+
+
 def test_speeds_are_sought_between_limits():
     theory = front(drag=1.0)
     slow, fast = theory.stress_ratio([0.9e-4 * theory.sound_velocity, 99 * theory.sound_velocity])

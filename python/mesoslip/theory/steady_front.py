@@ -29,6 +29,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mesoslip.errors import ConfigError, Problem
+from mesoslip.theory.contacts import contact_theory
 from mesoslip.theory.sliders import row_scales
 
 if TYPE_CHECKING:
@@ -64,8 +65,9 @@ class SteadyFront:
     Raises
     ------
     ConfigError
-        With another slider, a single block, a profile of the load, or contacts that attach again
-        (``contacts.reattach``).
+        With another slider, a single block, a profile of the load, contacts that attach again
+        (``contacts.reattach``), age, break by thermal activation, keep their thresholds, or lie on
+        a track.
 
     Notes
     -----
@@ -82,9 +84,7 @@ class SteadyFront:
         if not config.pressing.is_uniform:
             message = "a steady front needs the same strength of all blocks: leave it out"
             raise ConfigError([Problem("", "load.profile", message)])
-        if config.contacts.reattach:
-            message = "contacts that attach again have no steady fronts: set it to false"
-            raise ConfigError([Problem("", "contacts.reattach", message, True)])
+        contact_theory(config).check_steady_front()
         self.sound_velocity = scales.sound_velocity
         self._contacts, self._top, self._edge = scales.contacts, scales.top, scales.edge
         self._drag, self._viscosity, self._damping = scales.drag, scales.viscosity, scales.damping

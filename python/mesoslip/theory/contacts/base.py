@@ -70,6 +70,10 @@ class ContactTheory:
         """Refuse contacts without a force curve F(X)."""
         self._refuse("no force curve")
 
+    def check_steady_front(self) -> None:
+        """Refuse contacts whose detachment along a row of blocks has no steady fronts."""
+        self._refuse("no theory of steady fronts")
+
     def curve_groups(self) -> dict[str, xr.DataTree]:
         """Groups of the output of ``mesoslip curve`` beyond those of all kinds, by name."""
         return {}

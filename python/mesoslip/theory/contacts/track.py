@@ -26,6 +26,9 @@ class TrackTheory(PlainTheory):
     def sliding(self, velocity: float | None = None) -> LinearStability:
         return ContactTheory.sliding(self, velocity)
 
+    def check_steady_front(self) -> None:
+        ContactTheory.check_steady_front(self)
+
     def curve_groups(self) -> dict[str, xr.DataTree]:
         import xarray as xr
 

@@ -17,6 +17,9 @@ module mesoslip_loop_row
    !> Displacement that is rounding, over the breaking stretch of a contact, and over that of a
    !> block by its static force under all its springs, if contacts are much softer than these
    real(wp), parameter :: tiny_stretch = 4.0e-15_wp, tiny_bend = 4.0e-13_wp
+   !> Displacement of a block by its neighbours up to which first order is exact to rounding, over
+   !> that
+   real(wp), parameter :: unknown = 3.0e4_wp
 
 contains
 
@@ -41,6 +44,7 @@ contains
             & + slider%edge_stiffness + slider%top_stiffness / slider%blocks
          slider%tiny_displacement = parameters%static_force / parameters%stiffness &
             & * min(tiny_stretch, tiny_bend * softest / springs)
+         slider%max_unknown = unknown * slider%tiny_displacement
       end associate
       slider%has_clocks = contacts%has_clocks
       do block = 1, slider%blocks

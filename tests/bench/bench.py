@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
+sys.path.insert(1, str(Path(__file__).parents[1] / "python"))
 from fixed_step import numba_run, numpy_steps, verlet_run
 from mesoslip import Config
 from mesoslip.output.writing import write_results
@@ -24,6 +25,7 @@ from mesoslip.simulation.checkpoint import Checkpoint
 from mesoslip.simulation.realization import Realization
 from mesoslip.simulation.run_realizations import run_realizations
 from mesoslip.theory.force_curve import ForceCurve
+from plain_interface import PlainInterface
 
 ROOT = Path(__file__).parents[2]
 KLEIN = ROOT / "runs" / "klein.toml"
@@ -45,6 +47,9 @@ LAYERS_GOAL = 1.5
 MASTER_EQUATION_GOAL = 0.4
 COMMAND_GOALS = {"run": 0.8, "info": 0.5}
 FIXED_STEP_GOAL = 170.0
+# How many times as long as a row of 128 blocks a plain code takes for a break, and how many times as
+# long as with 8 blocks a break may take with 1024: as the square root of their number.
+PLAIN_ROW_GOAL, ROW_RATIO_GOAL = 50.0, 128**0.5
 # Cost of contacts that age over that of contacts that do not.
 AGEING_GOAL = 1.5
 # The same of other kinds of contacts over plain ones, and of some of them.
@@ -419,6 +424,71 @@ def layered_cost() -> None:
         step /= 2
 
 
+def row_of(blocks: int, contacts: int) -> Config:
+    """Blocks of runs/fronts.toml, however many there are, with contacts of each."""
+    part = blocks / 128
+    changes = {"slider.mass": 0.128 * part, "slider.length": 0.4 * part, "slider.blocks": blocks}
+    changes |= {"slider.bar_stiffness": 78.125e3 / part, "slider.top_stiffness": 300e3 * part}
+    changes |= {"contacts.count": blocks * contacts, "contacts.static_force": 128.0 * part}
+    changes |= {"contacts.stiffness": 142.4e6 * part, "contacts.drag": 2560.0 * part}
+    changes |= {"run.drive_displacement": 1e-3, "contacts.renewal": "keep"}
+    return Config.load(ROOT / "runs" / "fronts.toml").replace(changes)
+
+
+def cost_of_breaks(config: Config, breaks: float) -> float:
+    """Microseconds for a break and the birth after it, once a tenth of the contacts have broken."""
+    realization = Measured(config, 0)
+    while realization.breaks < 0.1 * config.contacts.count:
+        realization.advance(2000)
+    before, seconds = realization.breaks, realization.kernel_seconds
+    while realization.breaks < before + breaks and not realization.finished:
+        realization.advance(20_000)
+    return 1e6 * (realization.kernel_seconds - seconds) / (realization.breaks - before)
+
+
+def plain_row_cost(config: Config, breaks: int) -> float:
+    """The same of the plain code of the tests, in NumPy, from blocks that slip on all contacts."""
+    slider, contacts = config.slider, config.contacts
+    with Realization(config) as start:
+        stretches = start.contacts["break_stretch"].reshape(slider.block_count, -1)
+    plain = PlainInterface(
+        slider.mass,
+        slider.neighbour_spring,
+        slider.edge_stiffness,
+        slider.total_top_stiffness,
+        stretches * contacts.contact_stiffness,
+        contacts.contact_stiffness,
+        config.drive_speed,
+        delay=contacts.delay,
+        back_force_ratio=contacts.back_force_ratio,
+        drag=contacts.contact_drag,
+        neighbour_damping=slider.neighbour_damping,
+        damping=slider.damping_rate,
+    )
+    plain.place[:], plain.speed[:] = stretches.min(), 0.1
+    seconds = time.process_time()
+    while plain.breaks < breaks:
+        plain.advance(plain.time + 1e-7, 1e-6)
+    return 1e6 * (time.process_time() - seconds) / plain.breaks
+
+
+def interface_cost() -> None:
+    """Cost of a break over the number of blocks, and beside a plain code."""
+    print("\nCost of a break and rebirth in a row of blocks, springs from above and at the edge")
+    print("  blocks   contacts of each   us/break")
+    costs = {}
+    for blocks, contacts in ((8, 200), (128, 200), (1024, 200), (128, 1000)):
+        cost = cost_of_breaks(row_of(blocks, contacts), 100_000)
+        costs[blocks, contacts] = cost
+        print(f"  {blocks:6d} {contacts:18d} {cost:10.2f}", flush=True)
+    plain = plain_row_cost(row_of(128, 1000), 100)
+    print(f"  the plain code of the tests, in NumPy, 128 blocks of 1000 contacts: {plain:.0f} us")
+    ratio = costs[1024, 200] / costs[8, 200]
+    met.append(("1024 over 8 blocks of a row", ratio, "<=", ROW_RATIO_GOAL, ""))
+    ratio = plain / costs[128, 1000]
+    met.append(("a plain row in NumPy over events", ratio, ">=", PLAIN_ROW_GOAL, ""))
+
+
 def interacting(count: int, columns: int, strength: float | None) -> Config:
     """Klein's contacts at the same distance from each other, however many there are."""
     tables = Config.load(KLEIN, [f"contacts.count={count}"]).to_dict()
@@ -591,6 +661,7 @@ def main() -> None:
     curve_cost()
     master_equation_cost()
     layered_cost()
+    interface_cost()
     interaction_cost()
     quasistatic_cost()
     short_realizations()

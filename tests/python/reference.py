@@ -112,8 +112,14 @@ FURTHER: dict[str, dict[str, Any]] = {
     | CONTACTS["ageing"]
     | {"contacts__track": {"spread": 0.2, "length": 5e-9}},
 }
+# Blocks that are pushed at the edge, until the row has been through whole events.
+ROW = {
+    **{"kind": "interface", "blocks": 3, "mass": 1.47e-3, "length": 1e-2, "bar_stiffness": 2000.0},
+    **{"neighbour_damping": 500.0, "stiffness": 97.0, "damping_ratio": 0.2},
+}
 # The same of contacts one by one.
 INDIVIDUAL: dict[str, dict[str, Any]] = {
+    "eq-interface": {"slider": ROW},
     "eq-rigid-keep": SLIDERS["rigid"] | {"contacts__renewal": "keep"},
 }
 

@@ -73,7 +73,7 @@ contains
       integer :: points, node, term, n
 
       n = self%blocks
-      drag = share * self%block%law%drag * self%inverse_mass
+      drag = share * self%law_drag * self%inverse_mass
       if (.not. (any(drag > 0.0_wp) .or. self%damping > 0.0_wp .or. self%viscosity > 0.0_wp)) return
       points = points_for(self%rate * self%length)
       square = 0.0_wp

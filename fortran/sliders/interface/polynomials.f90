@@ -7,7 +7,7 @@ module mesoslip_sliders_interface_polynomials
    private
 
    public :: max_order, min_points, max_points, rule_type, new_rules, points_for
-   public :: bound, evaluate, integrals, move, reach_of
+   public :: bound, evaluate, evaluate_all, integrals, moments, move, reach_of
 
    !> Maximum order of the displacement
    integer, parameter :: max_order = 28
@@ -73,6 +73,54 @@ contains
          value = value * time + series(term)
       end do
    end subroutine evaluate
+
+   !> The same, with the third and fourth derivatives.
+   pure subroutine evaluate_all(series, order, time, value, slope, bend, jerk, snap)
+      real(wp), intent(in) :: series(0:)
+      integer, intent(in) :: order
+      real(wp), intent(in) :: time
+      real(wp), intent(out) :: value, slope, bend, jerk, snap
+
+      integer :: term
+
+      value = 0.0_wp
+      slope = 0.0_wp
+      bend = 0.0_wp
+      jerk = 0.0_wp
+      snap = 0.0_wp
+      do term = order, 0, -1
+         snap = snap * time + jerk
+         jerk = jerk * time + bend
+         bend = bend * time + slope
+         slope = slope * time + value
+         value = value * time + series(term)
+      end do
+      jerk = 6.0_wp * jerk
+      snap = 24.0_wp * snap
+   end subroutine evaluate_all
+
+   !> Value, and the one-, two- and threefold integrals from zero.
+   pure subroutine moments(series, order, time, values)
+      real(wp), intent(in) :: series(0:)
+      integer, intent(in) :: order
+      real(wp), intent(in) :: time
+      real(wp), intent(out) :: values(0:3)
+
+      real(wp) :: part
+      integer :: term
+
+      values = 0.0_wp
+      do term = order, 0, -1
+         part = series(term)
+         values(0) = values(0) * time + part
+         part = part * inverse(term + 1)
+         values(1) = values(1) * time + part
+         part = part * inverse(term + 2)
+         values(2) = values(2) * time + part
+         values(3) = values(3) * time + part * (1.0_wp / (term + 3))
+      end do
+      values(1:) = values(1:) * [time, time**2, time**3]
+   end subroutine moments
 
    !> Let a polynomial count from a later time; only its first terms are kept. By Horner's rule with
    !> polynomials as values: sums over terms side by side, unlike those of repeated division.

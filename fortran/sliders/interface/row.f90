@@ -2,23 +2,25 @@
 !>
 !> A step of the row is so short that the motion of each block in it is a polynomial, exact to
 !> rounding, if no contact breaks or attaches: the published motion, which its neighbours feel.
-!> A block whose contacts change continues on a motion of its own. The displacement of its
-!> neighbours by the excess over the published motion grows with the fourth power of time: it is
-!> integrated, and added to theirs before it exceeds rounding. Then they continue on motions of
-!> their own, too. So an event costs the work of one block and seldom of two or four more, however
-!> long the row.
+!> A block whose contacts change continues on a motion of its own. What its excess over the
+!> published motion does to its neighbours grows with the third or fourth power of time: it is added
+!> to their motions at their own events and at the end of the step, exact to first order, or before
+!> it is too large for that. So an event costs the work of one block, however long the row, and the
+!> step what its blocks cost side by side; steps are shorter while that saves more than it costs.
 module mesoslip_sliders_interface_row
    use mesoslip_interface_law, only: clocks, hazard_clock_type, interface_law_type, pose_type, &
       & window_type
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_sliders_hazard_clock, only: advance_clocks, limit_window
+   use mesoslip_sliders_interface_excess, only: note_excess, receive, receive_all
    use mesoslip_sliders_interface_losses, only: add_losses, add_published_losses
-   use mesoslip_sliders_interface_polynomials, only: bound, evaluate, integrals, max_order
+   use mesoslip_sliders_interface_polynomials, only: bound, evaluate, evaluate_all, integrals, &
+      & max_order, moments
    use mesoslip_sliders_interface_rest, only: try_rest
    use mesoslip_sliders_interface_series, only: drive_at, expand, expand_all, fastest_rate, &
       & expand_published, shorten_step
-   use mesoslip_sliders_interface_state, only: busy_pace, load_motion, min_order, &
-      & motion_of_damper, quiet_pace, row_state_type
+   use mesoslip_sliders_interface_state, only: busy_pace, excess_type, load_motion, &
+      & min_order, min_pace, motion_of_damper, quiet_pace, row_state_type
    use mesoslip_sliders_motion_series, only: first_end, inverse
    implicit none
    private
@@ -45,7 +47,7 @@ contains
       !> Time [s]
       real(wp), intent(in) :: end_time
 
-      integer :: order
+      integer :: block, order
 
       self%step_time = self%time
       self%base_time = self%time
@@ -53,6 +55,16 @@ contains
       self%moment = 0.0_wp
       self%excess_once = 0.0_wp
       self%excess_twice = 0.0_wp
+      self%excess_thrice = 0.0_wp
+      self%known = excess_type()
+      self%known_moment = 0.0_wp
+      self%publications = 0
+      do block = 1, self%blocks
+         associate (law => self%block(block)%law)
+            self%law_stiffness(block) = law%stiffness
+            self%law_drag(block) = law%drag
+         end associate
+      end do
       self%block%is_own = .false.
       self%block%exceeds = .false.
       self%events = 0
@@ -192,10 +204,10 @@ contains
          effect = self%bond * (twice + abs(self%excess_twice(block)) &
             & + abs(self%excess_once(block)) * step) &
             & + self%viscosity * (once + abs(self%excess_once(block)))
-         if (effect <= self%tiny_displacement) exit
+         if (effect <= self%max_unknown) exit
          self%block(block)%kind = event_publish
          step = step * max(0.1_wp, min(0.9_wp, &
-            & sqrt(sqrt(0.5_wp * self%tiny_displacement / effect))))
+            & sqrt(sqrt(0.5_wp * self%max_unknown / effect))))
       end do
    end subroutine limit_by_excess
 
@@ -222,8 +234,12 @@ contains
       select case (self%block(block)%kind)
       case (event_upper)
          self%place(block) = self%block(block)%window%upper
+         call receive(self, block, .true.)
       case (event_lower)
          self%place(block) = self%block(block)%window%lower
+         call receive(self, block, .true.)
+      case (event_time, event_clock)
+         call receive(self, block, .false.)
       case (event_turn)
          self%speed(block) = 0.0_wp
       case (event_again, event_publish)
@@ -248,7 +264,7 @@ contains
       real(wp), intent(in) :: step
 
       real(wp) :: series(0:max_order), velocity(0:max_order), damper(0:max_order), once, twice
-      real(wp) :: first_once, start
+      real(wp) :: part(0:3), start
       integer :: order, term
       logical :: is_due
 
@@ -271,10 +287,12 @@ contains
       end if
       call add_losses(self, block, series, order, step)
       if (self%block(block)%exceeds) then
-         call integrals(self%excess(:, block), order, step, once, twice)
-         first_once = self%excess_once(block)
-         self%excess_once(block) = first_once + once
-         self%excess_twice(block) = self%excess_twice(block) + first_once * step + twice
+         call moments(self%excess(:, block), order, step, part)
+         self%excess_thrice(block) = self%excess_thrice(block) + step * (self%excess_twice(block) &
+            & + 0.5_wp * step * self%excess_once(block)) + part(3)
+         self%excess_twice(block) = self%excess_twice(block) + step * self%excess_once(block) &
+            & + part(2)
+         self%excess_once(block) = self%excess_once(block) + part(1)
       end if
       if (self%damping > 0.0_wp) then
          once = 0.0_wp
@@ -285,7 +303,8 @@ contains
          self%damper(block) = once
       end if
       start = self%place(block)
-      call evaluate(series, order, step, self%place(block), self%speed(block), self%bend(block))
+      call evaluate_all(series, order, step, self%place(block), self%speed(block), &
+         & self%bend(block), self%jerk(block), self%snap(block))
       if (abs(self%speed(block)) > 0.0_wp) self%sense(block) = sign(1.0_wp, self%speed(block))
       self%moment(block) = self%moment(block) + step
       if (self%has_clocks) then
@@ -302,7 +321,7 @@ contains
    subroutine carry_published(self)
       class(row_state_type), intent(inout) :: self
 
-      real(wp), dimension(self%blocks) :: share, once, twice, part
+      real(wp), dimension(self%blocks) :: share, once, twice, part, jerk, snap
       integer :: term
 
       ! 1 for a block that goes on as published.
@@ -321,7 +340,11 @@ contains
          once = 0.0_wp
          twice = 0.0_wp
          part = 0.0_wp
+         jerk = 0.0_wp
+         snap = 0.0_wp
          do term = self%order, 0, -1
+            snap = snap * step + jerk
+            jerk = jerk * step + part
             part = part * step + twice
             twice = twice * step + once
             once = once * step + series(:, term)
@@ -330,6 +353,8 @@ contains
             self%place = once
             self%speed = twice
             self%bend = part
+            self%jerk = 6.0_wp * jerk
+            self%snap = 24.0_wp * snap
          end where
          if (self%damping > 0.0_wp) then
             once = 0.0_wp
@@ -354,6 +379,8 @@ contains
       type(hazard_clock_type), intent(in) :: clock(clocks)
 
       self%block(block)%law = law
+      self%law_stiffness(block) = law%stiffness
+      self%law_drag(block) = law%drag
       self%block(block)%window = window
       self%block(block)%clock = clock
       self%elapsed(:, block) = 0.0_wp
@@ -403,44 +430,27 @@ contains
       class(row_state_type), intent(inout) :: self
       integer, intent(in) :: block
 
-      real(wp) :: shown(0:max_order), value, slope, bend, excess
+      real(wp) :: shown(0:max_order), value, slope, bend
       integer :: neighbour
 
+      self%publications = self%publications + 1
       shown(:self%order) = self%published(block, :self%order)
       call evaluate(shown, self%order, self%moment(block), value, slope, bend)
-      excess = self%place(block) - value
+      self%excess(0, block) = self%place(block) - value
       do neighbour = block - 1, block + 1, 2
          if (neighbour < 1 .or. neighbour > self%blocks) cycle
          call carry(self, neighbour, self%moment(block) - self%moment(neighbour))
-         call give_excess(self, block, neighbour, excess)
+         call receive(self, neighbour, .false.)
       end do
       ! Losses of the neighbours until now are those beside the motion published before.
       call expand_published(self, block)
       self%excess_once(block) = 0.0_wp
       self%excess_twice(block) = 0.0_wp
+      self%excess_thrice(block) = 0.0_wp
+      do neighbour = block - 1, block + 1, 2
+         if (neighbour >= 1 .and. neighbour <= self%blocks) call note_excess(self, neighbour)
+      end do
    end subroutine publish
-
-   !> Give a neighbour what a block has done to it beyond its published motion.
-   subroutine give_excess(self, block, neighbour, excess)
-      class(row_state_type), intent(inout) :: self
-      integer, intent(in) :: block, neighbour
-      !> Displacement of the block beyond the published one [m]
-      real(wp), intent(in) :: excess
-
-      real(wp) :: kick
-
-      kick = self%bond * self%excess_once(block) + self%viscosity * excess
-      ! The work of the damping between them along the neighbour's motion, by parts.
-      self%damping_part = self%damping_part - self%viscosity * (excess * self%speed(neighbour) &
-         & - 2.0_wp * self%bend(neighbour) * self%excess_once(block))
-      self%place(neighbour) = self%place(neighbour) + self%bond * self%excess_twice(block) &
-         & + self%viscosity * self%excess_once(block)
-      self%speed(neighbour) = self%speed(neighbour) + kick
-      self%damper(neighbour) = self%damper(neighbour) + self%damping * kick
-      associate (window => self%block(neighbour)%window)
-         self%place(neighbour) = max(window%lower, min(window%upper, self%place(neighbour)))
-      end associate
-   end subroutine give_excess
 
    !> End the step: all blocks move to its end, and to their neighbours goes what they do not know.
    subroutine end_step(self)
@@ -459,11 +469,7 @@ contains
          call evaluate(shown, self%order, self%length, value, slope, bend)
          excess(block) = self%place(block) - value
       end do
-      do block = 1, self%blocks
-         if (.not. self%block(block)%exceeds) cycle
-         if (block > 1) call give_excess(self, block, block - 1, excess(block))
-         if (block < self%blocks) call give_excess(self, block, block + 1, excess(block))
-      end do
+      if (any(self%block%exceeds)) call receive_all(self, excess)
 
       associate (length => self%length, block_mass => 1.0_wp / self%inverse_mass)
          drive = drive_at(self, 0.0_wp)
@@ -490,7 +496,13 @@ contains
       self%base_time = self%time
       self%moment = 0.0_wp
       if (self%events > 0) then
-         self%pace = busy_pace
+         ! A neighbour that has to know costs as much as a step of some ten blocks.
+         if (32 * self%publications > self%blocks) then
+            self%event_pace = max(min_pace, 0.7_wp * self%event_pace)
+         else
+            self%event_pace = min(busy_pace, 1.2_wp * self%event_pace)
+         end if
+         self%pace = self%event_pace
       else
          self%pace = min(quiet_pace, 2.0_wp * self%pace)
       end if

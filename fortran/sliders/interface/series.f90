@@ -16,7 +16,7 @@ contains
       class(row_state_type), intent(in) :: self
       real(wp) :: rate
 
-      rate = rate_of(self, maxval(abs(self%block%law%stiffness)), maxval(self%block%law%drag))
+      rate = rate_of(self, maxval(abs(self%law_stiffness)), maxval(self%law_drag))
    end function fastest_rate
 
    !> Bound on the rates of a row whose blocks have contacts of a stiffness [N/m] and a drag [N s/m]
@@ -78,8 +78,8 @@ contains
       n = self%blocks
       drive = drive_at(self, 0.0_wp)
       stiffness = self%neighbours * self%bond + self%pull &
-         & + self%block%law%stiffness * self%inverse_mass
-      drag = self%block%law%drag * self%inverse_mass + self%neighbours * self%viscosity
+         & + self%law_stiffness * self%inverse_mass
+      drag = self%law_drag * self%inverse_mass + self%neighbours * self%viscosity
       offset = (self%block%law%offset + self%block%law%rate * self%offer_moment) * self%inverse_mass
       associate (series => self%published, damper => self%published_damper)
          damper(:, :1) = 0.0_wp

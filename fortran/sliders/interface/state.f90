@@ -13,7 +13,8 @@ module mesoslip_sliders_interface_state
    implicit none
    private
 
-   public :: row_state_type, block_values, busy_pace, quiet_pace, min_order, rounding
+   public :: row_state_type, excess_type
+   public :: block_values, busy_pace, quiet_pace, min_pace, min_order, rounding
    public :: load_motion, motion_of_damper, neighbour_motion
 
    !> Message where memory has run out
@@ -21,7 +22,7 @@ module mesoslip_sliders_interface_state
    !> Numbers of each block in the record: displacement, velocity, contact force, detached contacts
    integer, parameter :: block_values = 4
    !> Duration of a step in units of one over the fastest rate, while contacts break, and at most
-   real(wp), parameter :: busy_pace = 0.2_wp, quiet_pace = 2.5_wp
+   real(wp), parameter :: busy_pace = 0.2_wp, quiet_pace = 2.5_wp, min_pace = 0.02_wp
    !> Minimum order of a motion
    integer, parameter :: min_order = 4
    !> Forces and displacements that are equal up to rounding
@@ -41,6 +42,11 @@ module mesoslip_sliders_interface_state
       integer :: own_order = min_order
    end type block_type
 
+   !> An excess over published motions, and its integrals since the start of the step.
+   type :: excess_type
+      real(wp) :: value = 0.0_wp, once = 0.0_wp, twice = 0.0_wp, thrice = 0.0_wp
+   end type excess_type
+
    !> Blocks in a row, joined by springs, with a spring to the drive at the first, or at all.
    type, abstract, extends(slider_type) :: row_state_type
       !> Number of blocks
@@ -53,6 +59,9 @@ module mesoslip_sliders_interface_state
       real(wp) :: edge_stiffness = 0.0_wp, top_stiffness = 0.0_wp
       !> Displacement that is rounding [m]
       real(wp) :: tiny_displacement = 0.0_wp
+      !> Displacement of a block by its neighbours, beyond their published motions, up to which it
+      !> goes on without [m]
+      real(wp) :: max_unknown = 0.0_wp
       !> Stiffness of the contacts of a block when all are pinned [N/m]
       real(wp) :: pinned_stiffness = 0.0_wp
       type(block_type), allocatable :: block(:)
@@ -68,6 +77,10 @@ module mesoslip_sliders_interface_state
       real(wp), allocatable :: detached(:)
       !> Duration of the next step in units of one over the fastest rate
       real(wp) :: pace = busy_pace
+      !> The same after steps with contact events, and how often in the step blocks had to know of a
+      !> neighbour before its end
+      real(wp) :: event_pace = busy_pace
+      integer :: publications = 0
       !> Whether no contact broke or attached in the last step; whether all blocks rest
       logical :: is_quiet = .false., rests = .false.
       !> Time from which the blocks' own times count: the start of a step, then its end [s]
@@ -89,8 +102,15 @@ module mesoslip_sliders_interface_state
       !> Own motion of each block since its own time, the damper's, and the excess over the
       !> published motion, shape (0:max_order, blocks); motion of both neighbours together
       real(wp), allocatable :: own(:, :), own_damper(:, :), excess(:, :), around(:, :)
-      !> Integral of the excess since it was last published, and the integral of that
-      real(wp), allocatable :: excess_once(:), excess_twice(:)
+      !> Integral of the excess since it was last published, the integral of that, and once more
+      real(wp), allocatable :: excess_once(:), excess_twice(:), excess_thrice(:)
+      !> Excess of both neighbours together that a block knows, and up to when [s]
+      type(excess_type), allocatable :: known(:)
+      real(wp), allocatable :: known_moment(:)
+      !> Third and fourth derivatives of the motion of each block at its own time
+      real(wp), allocatable :: jerk(:), snap(:)
+      !> Laws of the blocks' contacts side by side: stiffness [N/m] and drag [N s/m]
+      real(wp), allocatable :: law_stiffness(:), law_drag(:)
       !> Time after the start of the step up to which its motion is exact [s]
       real(wp), allocatable :: horizon(:)
       !> Time until its next event [s]
@@ -139,6 +159,12 @@ contains
          call reserve(self%detached, n, 0.0_wp, error)
          call reserve(self%excess_once, n, 0.0_wp, error)
          call reserve(self%excess_twice, n, 0.0_wp, error)
+         call reserve(self%excess_thrice, n, 0.0_wp, error)
+         call reserve(self%known_moment, n, 0.0_wp, error)
+         call reserve(self%jerk, n, 0.0_wp, error)
+         call reserve(self%snap, n, 0.0_wp, error)
+         call reserve(self%law_stiffness, n, 0.0_wp, error)
+         call reserve(self%law_drag, n, 0.0_wp, error)
          call reserve(self%horizon, n, 0.0_wp, error)
          call reserve(self%span, n, 0.0_wp, error)
          call reserve(self%pull, n, 0.0_wp, error)
@@ -153,7 +179,10 @@ contains
          call reserve_table(self%elapsed, [1, 1], [clocks, n], error)
          if (.not. allocated(error)) call self%queue%open(n, error)
          if (allocated(error)) return
-         allocate (self%block(n), stat=stat)
+         allocate (self%known(n), stat=stat)
+         if (stat == 0) then
+            allocate (self%block(n), stat=stat)
+         end if
          if (stat /= 0) then
             call raise(error, status_memory, no_memory)
             return

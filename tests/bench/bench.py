@@ -47,8 +47,8 @@ LAYERS_GOAL = 1.5
 MASTER_EQUATION_GOAL = 0.4
 COMMAND_GOALS = {"run": 0.8, "info": 0.5}
 FIXED_STEP_GOAL = 170.0
-# How many times as long as a row of 128 blocks a plain code takes for a break, and how many times as
-# long as with 8 blocks a break may take with 1024: as the square root of their number.
+# How many times as long as a row of 128 blocks a plain code takes for a break, and how many times
+# as long as with 8 blocks a break may take with 1024: as the square root of their number.
 PLAIN_ROW_GOAL, ROW_RATIO_GOAL = 50.0, 128**0.5
 # Cost of contacts that age over that of contacts that do not.
 AGEING_GOAL = 1.5
@@ -478,7 +478,7 @@ def interface_cost() -> None:
     print("  blocks   contacts of each   us/break")
     costs = {}
     for blocks, contacts in ((8, 200), (128, 200), (1024, 200), (128, 1000)):
-        cost = cost_of_breaks(row_of(blocks, contacts), 100_000)
+        cost = cost_of_breaks(row_of(blocks, contacts), 200_000 + 200 * blocks)
         costs[blocks, contacts] = cost
         print(f"  {blocks:6d} {contacts:18d} {cost:10.2f}", flush=True)
     plain = plain_row_cost(row_of(128, 1000), 100)

@@ -211,13 +211,17 @@ def test_one_block_is_the_rigid_slider(loading):
     np.testing.assert_allclose(one.slips[:, :2], rigid.slips[:, :2], rtol=1e-4)
 
 
-def test_many_contacts_of_a_block_balance_the_energy():
-    """Several break before its neighbours have to know of it."""
-    tables = row(6, 8.0, damping=0.4)
+@pytest.mark.parametrize(
+    ("duration", "slider", "residual"), [(8.0, {"damping": 0.4}, 1e-13), (5.0, BOTH, 5e-13)]
+)
+def test_many_contacts_of_a_block_balance_the_energy(duration, slider, residual):
+    """Several break before its neighbours have to know of it: what they do is exact to first order,
+    with the force of the neighbours on theirs."""
+    tables = row(6, duration, **slider)
     tables["contacts"] |= {"count": 6 * 500, "threshold": {"law": "uniform", "relative_width": 0.1}}
     one = finished(tables)
     assert one.breaks > 2000
-    assert abs(one.energy_residual) < 1e-12
+    assert abs(one.energy_residual) < residual
 
 
 def test_a_rupture_is_the_break_of_half_of_the_pinned_contacts():

@@ -9,6 +9,7 @@ from typing import Any
 import mesoslip
 import numpy as np
 import pytest
+from conftest import ROOT
 from kinds import configuration
 from mesoslip import Config, ConfigError, FileError
 from mesoslip.analysis.fronts import EVENTS, FRONT_TYPES, first_front, fronts_of, static_balance
@@ -306,6 +307,22 @@ def test_the_command_prints_all_tables(tree, tmp_path, capsys):
     ):
         app(["fronts", str(tmp_path / "row.nc"), *arguments], standalone_mode=False)
         assert text in capsys.readouterr().out
+
+
+@pytest.mark.long
+def test_means_over_seeds_are_those_of_the_page():
+    """Force of the first precursor and of the first whole event, and precursors before that."""
+    run = Config.load(ROOT / "runs" / "precursors.toml")
+    changes = {"run.realizations": 8, "run.drive_displacement": 5.5e-4, "contacts.count": 640}
+    events = mesoslip.fronts(mesoslip.run(run.replace(changes)))["events"].to_dataset()
+    measured = []
+    for _, own in events.groupby("realization_index"):
+        force, whole = own["spring_force"].values, int(np.argmax(own["kind"].values))
+        assert own["kind"].values[whole] == 1, "no whole event"
+        measured.append((force[0], force[whole], whole))
+    means, errors = np.mean(measured, axis=0), np.std(measured, axis=0, ddof=1) / np.sqrt(8)
+    # Motion is chaotic: other digits are other seeds.
+    assert np.all(np.abs(means - [3.24, 13.7, 18.1]) < 4 * errors), (means, errors)
 
 
 def test_other_outputs_have_no_fronts():

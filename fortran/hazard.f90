@@ -22,6 +22,14 @@ module mesoslip_hazard
    !> reading lose digits accordingly
    real(wp), parameter :: max_fall = 8.0_wp
 
+   !> Hazard that is negligible: it is below the rounding of a deviate
+   real(wp), parameter :: negligible = 1.0e-16_wp
+   !> Maximum exponent of the rate of a contact whose force changed its sign, over that without a
+   !> force, and duration of a motion up to there over that at the present velocity
+   real(wp), parameter :: max_turn_exponent = 1.0_wp, max_turn_ratio = 2.0_wp
+   !> Velocity at which that is endless [m/s]
+   real(wp), parameter :: min_velocity = 1.0e-100_wp
+
    !> The clocks.
    type :: hazard_type
       !> Rate at the threshold, omega_0 [1/s], and k/f_T [1/m]
@@ -44,6 +52,9 @@ module mesoslip_hazard
       !> Exponent of the factor between a deviate and the increase of the clock, the key of a
       !> contact, and its remaining deviate
       procedure, non_overridable :: life_exponent, key, left
+      !> For forces that change their sign: maximum distance and duration of a motion until they are
+      !> changed, and the threshold from which the hazard in it is negligible
+      procedure, non_overridable :: turn_distance, turn_duration, turn_limit
    end type hazard_type
 
 contains
@@ -142,6 +153,36 @@ contains
 
       exponent = self%slope * (limit + force_sign(number) * (origin - self%reference(number)))
    end function life_exponent
+
+   !> Maximum distance from where the sign of a force changes to where it is changed [m].
+   pure function turn_distance(self) result(distance)
+      class(hazard_type), intent(in) :: self
+      real(wp) :: distance
+
+      distance = max_turn_exponent / self%slope
+   end function turn_distance
+
+   !> Maximum duration of a motion in which a force may change its sign at any time [s].
+   pure function turn_duration(self, velocity) result(duration)
+      class(hazard_type), intent(in) :: self
+      !> Velocity of the slider [m/s]
+      real(wp), intent(in) :: velocity
+      real(wp) :: duration
+
+      duration = max_turn_ratio * self%turn_distance() / max(abs(velocity), min_velocity)
+   end function turn_duration
+
+   !> Minimum stretch at the threshold of contacts for which it makes no difference when in such a
+   !> motion their forces change their sign [m]: their hazard until the end is negligible.
+   pure function turn_limit(self, velocity) result(limit)
+      class(hazard_type), intent(in) :: self
+      !> Velocity of the slider [m/s]
+      real(wp), intent(in) :: velocity
+      real(wp) :: limit
+
+      limit = (log(self%rate / negligible) + log(self%turn_duration(velocity)) &
+         & + max_turn_exponent) / self%slope
+   end function turn_limit
 
    !> Reading at which a contact breaks; never if it overflows: it is computed again after the
    !> reference has moved.

@@ -41,11 +41,10 @@ contains
       real(wp), parameter :: relax(4) = [3.0e-3_wp, 0.0_wp, 0.9_wp, 0.3_wp]
       character(len=name_length), parameter :: activation(4) = [character(len=name_length) :: &
          & "columns", "rows", "activation_rate", "activation_force"]
-      real(wp), parameter :: bell(4) = [0.0_wp, 0.0_wp, 1.0e3_wp, 0.05_wp * 18.0e-6_wp / count]
       type(parameters_type) :: parameters
       type(error_type), allocatable :: error
       type(recorder_parameters_type) :: recorder
-      real(wp) :: values(9), delay
+      real(wp) :: values(9), bell(4), delay
       character(len=:), allocatable :: kind, law_of_delay
 
       delay = 5.0e-4_wp
@@ -53,6 +52,9 @@ contains
       ! Scattered delays, and forces with which contacts attach.
       values = [real(count, wp), 18.0e-6_wp / count, 2000.0_wp / count, 6.7e-5_wp / count, delay, &
          & 0.1_wp, 1.0_wp, width, merge(0.05_wp, 0.0_wp, index(contacts, "scattered") > 0)]
+      ! Where it is cold, forces change their sign without a step of their own.
+      bell = [0.0_wp, 0.0_wp, 1.0e3_wp, merge(0.01_wp, 0.05_wp, index(contacts, "cold") > 0) &
+         & * 18.0e-6_wp / count]
       select case (contacts)
       case ("lattice")
          call new_parameters(parameters, [character(len=name_length) :: common, "columns", "rows", &
@@ -73,7 +75,7 @@ contains
       case ("thermal", "thermal scattered")
          call new_parameters(parameters, [character(len=name_length) :: common, activation], &
             & [values, bell])
-      case ("thermal ageing")
+      case ("thermal ageing", "thermal ageing cold")
          call new_parameters(parameters, [character(len=name_length) :: common, ageing, &
             & activation], [values, relax, bell])
       case ("populations")
@@ -90,6 +92,7 @@ contains
          kind = merge("thermal ", "ensemble", contacts(:1) == "t")
          law_of_delay = "exponential"
       end if
+      if (index(contacts, " cold") > 0) kind = contacts(:index(contacts, " cold") - 1)
       call parameters%add_word("delay_law", law_of_delay)
       call parameters%add_word("coupling", trim(coupling_names(merge(coupling_equal, coupling, &
          & any(contacts(:1) == ["a", "t"])))))

@@ -26,6 +26,7 @@ program test_resume
    call continues("thermal", "rigid", "series")
    call continues("thermal", "prescribed", "series")
    call continues("thermal ageing", "rigid", "series")
+   call continues("thermal ageing cold", "rigid", "series")
    call continues("thermal ageing populations", "rigid", "series")
    call refuses()
    if (len(sundials_version()) > 0) then

@@ -2,11 +2,12 @@
 module mesoslip_contacts_ageing_base
    use mesoslip_contacts_ageing_law, only: ageing_law_type
    use mesoslip_contacts_ageing_meeting, only: meet, meet_bound
+   use mesoslip_contacts_ageing_prediction, only: prediction_type
    use mesoslip_contacts_individual_base, only: individual_contacts_type
    use mesoslip_contacts_individual_queue, only: contact_queue_type
    use mesoslip_contacts_individual_record, only: row_limit, row_origin, row_renewal, &
       & row_stiffness, ahead_coordinate
-   use mesoslip_interface_law, only: interface_law_type, pose_type
+   use mesoslip_interface_law, only: pose_type
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_schedule, only: max_events
    implicit none
@@ -81,10 +82,8 @@ module mesoslip_contacts_ageing_base
       real(wp) :: scan_time = huge(1.0_wp)
       !> Time of the last response [s]
       real(wp) :: now = 0.0_wp
-      !> Law that was offered last, the predicted acceleration [m/s2] and jerk of the slider under
-      !> it, the error of the jerk in recent motions, and a bound on its error [m/s3]
-      type(interface_law_type) :: law_offered
-      real(wp) :: acceleration = 0.0_wp, jerk = 0.0_wp, jerk_error = 0.0_wp, jerk_bound = 0.0_wp
+      !> Motion of the slider as predicted under the law that was offered last
+      type(prediction_type) :: prediction
       !> Whether the slider moves steadily in the direction of the queue, number of that motion, the
       !> speed for which limits are solved [m/s], and limits solved since it was set
       logical :: is_steady = .false.

@@ -21,8 +21,7 @@ module mesoslip_contacts_ageing_contacts
    use mesoslip_contacts_ageing_law, only: take_ageing_law
    use mesoslip_contacts_ageing_leaders, only: add_leader, bound_leaders, break_leaders, &
       & remove_leader
-   use mesoslip_contacts_ageing_motion, only: bound_speed, compare_motion, follow_motion, &
-      & min_ratio, predict_motion
+   use mesoslip_contacts_ageing_motion, only: bound_speed, follow_motion, min_ratio
    use mesoslip_contacts_ageing_steady, only: break_steady, end_steady, plan_steady, &
       & queue_newborn, settle_steady
    use mesoslip_contacts_base, only: contact_parameters_type, contacts_type
@@ -132,7 +131,7 @@ contains
       lower = self%behind
       end_time = min(self%detached%next_due, self%sites%next_time)
       self%cost = 1.0_wp
-      call predict_motion(self, pose, law)
+      call self%prediction%predict(pose, law)
       call follow_motion(self, pose)
       if (self%is_steady) then
          upper = self%queue%first_key
@@ -154,9 +153,9 @@ contains
 
       self%now = after%time
       if (self%is_steady) then
-         self%jerk_error = 0.0_wp
+         self%prediction%jerk_error = 0.0_wp
       else
-         call compare_motion(self, before, after)
+         call self%prediction%compare(before, after)
       end if
       breaks = self%breaks
       self%is_unchanged = min(self%detached%next_due, self%sites%next_time) > after%time
@@ -192,7 +191,7 @@ contains
       type(pose_type), intent(in) :: pose
 
       self%now = pose%time
-      self%jerk_error = 0.0_wp
+      self%prediction%jerk_error = 0.0_wp
       call settle_steady(self, schedule)
       ! A contact that has just broken and attaches at once was not in the schedule.
       if (schedule%is_over) call self%attach_due(pose)
@@ -314,7 +313,7 @@ contains
       class(contact_ageing_type), intent(inout) :: self
       real(wp), intent(in) :: shift
 
-      self%law_offered%offset = self%law_offered%offset - self%law_offered%stiffness * shift
+      call self%prediction%shift(shift)
       if (self%scan_upper < huge(1.0_wp)) then
          self%scan_upper = self%scan_upper - self%direction * shift
          self%scan_lower = self%scan_lower - self%direction * shift
@@ -339,13 +338,7 @@ contains
       call archive%exchange("scan_lower", self%scan_lower)
       call archive%exchange("scan_time", self%scan_time)
       call archive%exchange("now", self%now)
-      call archive%exchange("stiffness_offered", self%law_offered%stiffness)
-      call archive%exchange("offset_offered", self%law_offered%offset)
-      call archive%exchange("drag_offered", self%law_offered%drag)
-      call archive%exchange("acceleration", self%acceleration)
-      call archive%exchange("jerk", self%jerk)
-      call archive%exchange("jerk_error", self%jerk_error)
-      call archive%exchange("jerk_bound", self%jerk_bound)
+      call self%prediction%exchange(archive)
       call archive%exchange("is_unchanged", self%is_unchanged)
       call archive%exchange("is_steady", self%is_steady)
       call archive%exchange("motion", self%motion)

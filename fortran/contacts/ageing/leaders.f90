@@ -1,9 +1,9 @@
 !> The leaders: contacts that may break next while their thresholds grow.
 !>
 !> The breaks of leaders are extrapolated from the motion of the slider, with a margin: its
-!> acceleration and jerk follow from the law that it is offered. A slider that arrives where a
-!> leader was expected to break finds it due, or a little ahead; then its break is extrapolated
-!> again.
+!> acceleration and jerk follow from the law that it is offered
+!> (mesoslip_contacts_ageing_prediction). A slider that arrives where a leader was expected to break
+!> finds it due, or a little ahead; then its break is extrapolated again.
 module mesoslip_contacts_ageing_leaders
    use mesoslip_contacts_ageing_base, only: ageing_contacts_type, any_motion, append, in_leaders, &
       & in_queue, leaders, life_birth, life_limit, life_motion, tiny_gap
@@ -16,17 +16,8 @@ module mesoslip_contacts_ageing_leaders
 
    public :: bound_leaders, break_leaders, add_leader, remove_leader
 
-   !> Relative change of the speed of approach up to which the time of a break is a short series
-   real(wp), parameter :: max_excess = 1.0e-5_wp
-   !> The same up to which that series starts Newton's method, and relative change of the time after
-   !> which it ends: the error is the square of that
-   real(wp), parameter :: max_start_excess = 0.2_wp, max_change = 1.0e-6_wp
-   !> Steps of Newton's method, which converges from one side: fewer only make windows shorter
-   integer, parameter :: max_steps = 8
    !> Contacts that are taken out of the queue together
    integer, parameter :: max_gathered = 16
-   !> Maximum duration for which a bound on the displacement is extrapolated [s], and its margin
-   real(wp), parameter :: max_duration = 1.0e9_wp, margin = 1.5_wp
 
 contains
 
@@ -41,7 +32,8 @@ contains
 
       real(wp) :: reach
 
-      reach = reach_of(self, pose, end_time)
+      reach = huge(1.0_wp)
+      if (.not. self%jumps) reach = self%prediction%reach(pose, self%direction, end_time)
       call extrapolate_first(self, pose, reach, upper)
       if (self%queue%first_key < min(upper, reach)) then
          call gather(self, pose)
@@ -144,37 +136,15 @@ contains
       end associate
    end subroutine sort_leader
 
-   !> Coordinate that the slider does not reach before a time [s].
-   pure function reach_of(self, pose, time) result(coordinate)
-      class(ageing_contacts_type), intent(in) :: self
-      type(pose_type), intent(in) :: pose
-      real(wp), intent(in) :: time
-      real(wp) :: coordinate
-
-      real(wp) :: duration, speed
-
-      coordinate = huge(1.0_wp)
-      duration = time - pose%time
-      if (self%jumps .or. duration > max_duration) return
-      speed = abs(pose%velocity) &
-         & + (abs(self%acceleration) + (abs(self%jerk) + self%jerk_bound) * duration) &
-         & * duration
-      coordinate = self%direction * pose%displacement + margin * speed * duration
-   end function reach_of
-
    !> Coordinate at which a leader breaks by extrapolation, not beyond where it does break.
-   !>
-   !> In a time t the slider moves by speed t + pull t^2 + third t^3, with an error that grows as
-   !> t^3, and the threshold grows by about rate t + bend t^2.
    pure function extrapolated_break(self, contact, pose) result(coordinate)
       class(ageing_contacts_type), intent(in) :: self
       integer, intent(in) :: contact
       type(pose_type), intent(in) :: pose
       real(wp) :: coordinate
 
-      real(wp) :: age, limit, rate, bend, here, gap, speed, pull, third, error, growth, later_rate
-      real(wp) :: step, excess, slope, change
-      integer :: number
+      real(wp) :: age, limit, rate, here, growth
+      logical :: is_known
 
       coordinate = self%ahead_of(contact)
       if (self%life(life_motion, contact) >= any_motion) return
@@ -182,42 +152,11 @@ contains
       age = pose%time - self%life(life_birth, contact)
       call self%ageing%evaluate(self%life(life_limit, contact), self%mean_of(contact), age, limit, &
          & rate)
-      speed = self%direction * pose%velocity
-      if (.not. speed > rate) return
       here = self%direction * self%record(row_origin, contact) + limit
-      gap = here - self%direction * pose%displacement
-      slope = 1.0_wp / (speed - rate)
-      step = gap * slope
-      if (.not. step > 0.0_wp) return
-      pull = 0.5_wp * self%direction * self%acceleration
-      third = (1.0_wp / 6.0_wp) * self%direction * self%jerk
-      error = (1.0_wp / 6.0_wp) * self%jerk_bound * step**2
-      if (.not. (error < 0.5_wp * speed .and. (abs(pull) + abs(third) * step) * step &
-         & < 0.25_wp * speed)) return
-
-      bend = 0.5_wp * self%ageing%curvature(rate, age)
-      excess = (pull + third * step - bend) * step * slope
-      if (abs(excess) <= max_excess .and. abs(bend) * step**3 &
-         & <= 0.1_wp * tiny_gap * self%stretch * self%ageing%time) then
-         step = step * (1.0_wp - excess * (1.0_wp - 2.0_wp * excess))
-         growth = (rate + bend * step) * step
-      else
-         if (abs(excess) < max_start_excess) step = step * (1.0_wp - excess)
-         do number = 1, max_steps
-            call self%ageing%grow(rate, age, step, growth, later_rate)
-            slope = speed + (2.0_wp * pull + 3.0_wp * third * step) * step - later_rate
-            if (.not. slope > 0.0_wp) return
-            change = (gap + growth - step * (speed + (pull + third * step) * step)) / slope
-            step = max(0.0_wp, step + change)
-            growth = growth + later_rate * change
-            if (abs(change) <= max_change * step) exit
-         end do
-         growth = max(growth, 0.0_wp)
-         ! A slider that slows down arrives later than one at the present speed.
-         slope = 1.0_wp / min(speed - rate, slope)
-         error = (1.0_wp / 6.0_wp) * self%jerk_bound * step**2
-      end if
-      coordinate = max(coordinate, here + max(0.0_wp, 1.0_wp - error * slope) * growth)
+      call self%prediction%extrapolate(self%ageing, rate, age, &
+         & here - self%direction * pose%displacement, self%direction * pose%velocity, &
+         & self%direction, tiny_gap * self%stretch, growth, is_known)
+      if (is_known) coordinate = max(coordinate, here + growth)
    end function extrapolated_break
 
    !> Break the leaders that are due, in the order of their keys.

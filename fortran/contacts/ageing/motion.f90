@@ -1,21 +1,18 @@
-!> Motion of the slider as contacts that age predict it, and the speed for which they are queued.
+!> The motion of the slider for which contacts that age are queued: steady, or a maximum speed.
 module mesoslip_contacts_ageing_motion
    use mesoslip_contacts_ageing_base, only: ageing_contacts_type
    use mesoslip_contacts_ageing_steady, only: begin_steady, end_steady
-   use mesoslip_interface_law, only: interface_law_type, pose_type
+   use mesoslip_interface_law, only: pose_type
    use mesoslip_numerics_kinds, only: wp
    implicit none
    private
 
-   public :: follow_motion, predict_motion, compare_motion, bound_speed, min_ratio
+   public :: follow_motion, bound_speed, min_ratio
 
    !> Speed of the queue over that of the slider: when it is set, and when it is too low or too high
    real(wp), parameter :: set_ratio = 2.0_wp, min_speed_ratio = 1.3_wp, max_speed_ratio = 8.0_wp
    !> Speed over that of ageing below which contacts are old where they break
    real(wp), parameter :: min_ratio = 0.05_wp
-   !> Factor of the last error of the jerk in a bound on the next, factor by which errors decay from
-   !> motion to motion, and minimum relative error
-   real(wp), parameter :: safety = 4.0_wp, memory = 0.99_wp, min_jerk_error = 1.0e-3_wp
    !> Maximum duration for which a bound on the velocity is extrapolated [s]
    real(wp), parameter :: max_time = 1.0e9_wp
 
@@ -60,40 +57,6 @@ contains
       end if
    end subroutine set_speed
 
-   !> Predict acceleration and jerk of the slider under a law, from its pose with the acceleration
-   !> under the law before.
-   pure subroutine predict_motion(self, pose, law)
-      class(ageing_contacts_type), intent(inout) :: self
-      type(pose_type), intent(in) :: pose
-      type(interface_law_type), intent(in) :: law
-
-      real(wp) :: change
-
-      change = (law%stiffness - self%law_offered%stiffness) * pose%displacement &
-         & - (law%offset - self%law_offered%offset) &
-         & + (law%drag - self%law_offered%drag) * pose%velocity
-      self%law_offered = law
-      self%acceleration = pose%acceleration - pose%inverse_mass * change
-      self%jerk = -(pose%own_rate**2 + pose%inverse_mass * law%stiffness) * pose%velocity &
-         & - pose%inverse_mass * law%drag * self%acceleration
-      ! A drive or a damper may change as fast as the slider itself.
-      self%jerk_bound = safety * self%jerk_error + min_jerk_error * abs(self%jerk) &
-         & + pose%own_rate * (pose%own_rate * abs(pose%velocity) + abs(self%acceleration))
-   end subroutine predict_motion
-
-   !> Compare a motion with its prediction.
-   pure subroutine compare_motion(self, before, after)
-      class(ageing_contacts_type), intent(inout) :: self
-      type(pose_type), intent(in) :: before, after
-
-      real(wp) :: duration
-
-      duration = after%time - before%time
-      if (.not. duration > 0.0_wp) return
-      self%jerk_error = max(abs(after%acceleration - self%acceleration - self%jerk * duration) &
-         & / duration, memory * self%jerk_error)
-   end subroutine compare_motion
-
    !> End a window before the slider may become faster than the speed of the queue.
    pure subroutine bound_speed(self, pose, end_time)
       class(ageing_contacts_type), intent(in) :: self
@@ -103,8 +66,8 @@ contains
       real(wp) :: room, pull, bend, time
 
       room = self%speed - abs(pose%velocity)
-      pull = abs(self%acceleration)
-      bend = 0.5_wp * (abs(self%jerk) + self%jerk_bound)
+      pull = abs(self%prediction%acceleration)
+      bend = 0.5_wp * (abs(self%prediction%jerk) + self%prediction%jerk_bound)
       time = min(end_time - pose%time, max_time)
       if (2.0_wp * (pull + bend * time) * time <= room) return
       if (4.0_wp * pull * time > room) time = 0.25_wp * room / pull

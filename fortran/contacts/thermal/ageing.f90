@@ -7,19 +7,26 @@
 !> 26 (1979) 403). This is exact and has no time step. The bound of a growing threshold is its last
 !> value; that of a falling one is its value at a later time, when the bound is renewed.
 !>
+!> A contact breaks where the slider meets its threshold, too. The first of those that grow, the
+!> leaders, are extrapolated from the motion of the slider, as of contacts without temperature
+!> (mesoslip_contacts_ageing_prediction); the others are ordered by a bound, their thresholds when
+!> they were looked at last.
+!>
 !> In a uniform prescribed motion all this is done at birth, as the time at which a contact has a
 !> stretch is known. When the motion changes, a contact that is left draws another deviate: its
 !> hazard from then on does not depend on the one before.
 module mesoslip_contacts_thermal_ageing
    use mesoslip_contacts_ageing_law, only: ageing_law_type, take_ageing_law
+   use mesoslip_contacts_ageing_prediction, only: prediction_type
    use mesoslip_contacts_base, only: contact_parameters_type, contacts_type
    use mesoslip_contacts_individual_break_tree, only: break_tree_type, new_break_tree
+   use mesoslip_contacts_individual_sorting, only: before
    use mesoslip_contacts_individual_record, only: row_limit, row_origin, row_renewal, row_stiffness
    use mesoslip_contacts_thermal_contacts, only: thermal_contacts_type, initialize_thermal, &
-      & offer_thermal
-   use mesoslip_contacts_thermal_keys, only: exchange_thermal, life_key, life_left
+      & offer_thermal, respond_thermal
+   use mesoslip_contacts_thermal_keys, only: exchange_thermal, life_clock, life_key, life_left
    use mesoslip_contacts_thermal_steady, only: grown, set_up_steady
-   use mesoslip_hazard, only: never
+   use mesoslip_hazard, only: force_sign, never
    use mesoslip_interface_law, only: interface_law_type, pose_type, window_type
    use mesoslip_numerics_archive, only: archive_type
    use mesoslip_numerics_errors, only: error_type, raise, status_memory
@@ -36,19 +43,25 @@ module mesoslip_contacts_thermal_ageing
    real(wp), parameter :: tiny_gap = 1.0e-12_wp
    !> Fall of a threshold until its bound is renewed: over f_T, and over the gap to the force
    real(wp), parameter :: max_drop = 0.5_wp, max_gap_part = 0.9_wp
-   !> In a uniform motion: growth of a threshold over f_T until a contact is expected to break,
-   !> above which its bound is renewed before, and the distance from there to that break over f_T/k
+   !> Growth of a threshold over f_T until a contact is expected to break, above which its bound is
+   !> renewed before; in a uniform motion the distance from there to that break over f_T/k
    real(wp), parameter :: max_growth = 0.3_wp, early = 2.0_wp
+   !> Maximum number of leaders, and of those whose breaks are extrapolated at once
+   integer, parameter :: max_leaders = 64, max_extrapolated = 16
+   !> Maximum number of contacts whose forces may change their sign in one motion
+   integer, parameter :: max_turns = 64
    !> Number of deviates of a life, after which they repeat
    integer(i8), parameter :: max_attempts = 65535_i8
 
    !> Numbers of the age of a contact: time of attaching [s], configured breaking stretch [m], time
-   !> at which its bound is renewed [s], and deviates drawn in its life
-   integer, parameter :: age_length = 4
-   integer, parameter :: age_birth = 1, age_limit = 2, age_renewal = 3, age_attempts = 4
+   !> at which its bound is renewed [s], deviates drawn in its life, and its threshold, or a bound,
+   !> when it was looked at last [m]
+   integer, parameter :: age_length = 5
+   integer, parameter :: age_birth = 1, age_limit = 2, age_renewal = 3, age_attempts = 4, &
+      & age_bound = 5
 
    !> Thermally activated contacts that age. The limit in a record is a lower bound on the breaking
-   !> stretch.
+   !> stretch, by which the hazard is bounded.
    type, extends(thermal_contacts_type) :: thermal_ageing_contacts_type
       !> How thresholds change
       type(ageing_law_type), private :: ageing
@@ -58,12 +71,24 @@ module mesoslip_contacts_thermal_ageing
       type(break_tree_type), private :: order_renewal
       !> Whether contacts are those of the start
       logical, private :: is_start = .false.
+      !> Motion of the slider as predicted under the law that was offered last
+      type(prediction_type), private :: prediction
+      !> The leaders, and their bounds as coordinates [m], in decreasing order; none of them is in
+      !> the order ahead
+      integer, private :: leaders = 0, leader(max_leaders) = 0
+      real(wp), private :: leader_key(max_leaders) = 0.0_wp
+      !> Contacts whose forces may change their sign in the present motion, and the coordinates at
+      !> which they do [m]; meanwhile they are missing in the order ahead
+      integer, private :: turns = 0, turning(max_turns) = 0
+      real(wp), private :: turn_key(max_turns) = 0.0_wp
    contains
-      procedure :: initialize, offer, plan, leave, begin_life, accepts_break, update_bounds, &
-         & rebuild, records, exchange, limit_at_birth
+      procedure :: initialize, offer, respond, plan, leave, begin_life, accepts_break, &
+         & update_bounds, rebuild, records, exchange, limit_at_birth, shift_order
+      procedure :: find_ahead, bound_ahead, gather_ahead
       procedure :: start_steadily, end_steadily, solve_newborn, begin_solved
       procedure, non_overridable, private :: set_bound, threshold, mean_of, draw_attempt, &
-         & solve_break, falling_bound
+         & solve_break, falling_bound, turns_ahead, may_turn_later, is_extrapolated, &
+         & extrapolate, add_leader, drop_leader, break_leaders
    end type thermal_ageing_contacts_type
 
 contains
@@ -114,7 +139,236 @@ contains
 
       call offer_thermal(self, pose, law, window)
       window%end_time = min(window%end_time, self%order_renewal%first())
+      if (self%turns > 0) window%end_time = min(window%end_time, pose%time &
+         & + self%hazard%turn_duration(pose%velocity))
    end subroutine offer
+
+   subroutine respond(self, before, after)
+      class(thermal_ageing_contacts_type), intent(inout) :: self
+      type(pose_type), intent(in) :: before, after
+
+      integer :: turn
+
+      if (self%is_steady) then
+         self%prediction%jerk_error = 0.0_wp
+      else
+         call self%prediction%compare(before, after)
+      end if
+      do turn = 1, self%turns
+         call self%order(self%ahead)%put(self%turning(turn), self%turn_key(turn))
+      end do
+      self%turns = 0
+      call respond_thermal(self, before, after)
+   end subroutine respond
+
+   !> The lowest of the leaders' breaks by extrapolation and the bounds of the others. A contact
+   !> whose bound comes before becomes a leader, with its present threshold as its bound. A force
+   !> may change its sign before that where the hazard until then is negligible. Where the slider
+   !> has no inertia, and may jump, there are bounds only.
+   subroutine find_ahead(self, pose, law, ahead)
+      class(thermal_ageing_contacts_type), intent(inout) :: self
+      type(pose_type), intent(in) :: pose
+      type(interface_law_type), intent(in) :: law
+      real(wp), intent(out) :: ahead
+
+      real(wp) :: first, latest, key(max_extrapolated)
+      integer :: number, contact(max_extrapolated)
+      logical :: leads
+
+      call self%prediction%predict(pose, law)
+      if (.not. pose%inverse_mass > 0.0_wp) then
+         call self%order(self%ahead)%first(ahead)
+         return
+      end if
+      latest = self%prediction%reach(pose, self%direction, min(self%detached%next_due, &
+         & self%sites%next_time, self%order_renewal%first()))
+      ahead = huge(1.0_wp)
+      number = 0
+      do
+         call self%order(self%ahead)%first(first)
+         leads = .false.
+         if (self%leaders > 0) leads = self%leader_key(self%leaders) <= first
+         if (leads) first = self%leader_key(self%leaders)
+         if (.not. first < min(ahead, latest) .or. number == max_extrapolated) exit
+         associate (one => contact(number + 1))
+            if (leads) then
+               one = self%leader(self%leaders)
+               self%leaders = self%leaders - 1
+            else
+               call self%order(self%ahead)%due(first, one)
+               if (self%may_turn_later(one, pose%velocity)) then
+                  call self%order(self%ahead)%remove(one)
+                  self%turns = self%turns + 1
+                  self%turning(self%turns) = one
+                  self%turn_key(self%turns) = first
+                  ahead = min(ahead, first + self%hazard%turn_distance())
+                  cycle
+               end if
+               if (.not. self%is_extrapolated(one)) exit
+            end if
+            number = number + 1
+            call self%extrapolate(one, pose, key(number), ahead)
+         end associate
+      end do
+      ahead = min(ahead, first)
+      do number = number, 1, -1
+         call self%add_leader(contact(number), key(number))
+      end do
+   end subroutine find_ahead
+
+   !> Whether the force of a contact changes its sign ahead.
+   pure function turns_ahead(self, contact)
+      class(thermal_ageing_contacts_type), intent(in) :: self
+      integer, intent(in) :: contact
+      logical :: turns_ahead
+
+      turns_ahead = force_sign(int(self%life(life_clock, contact))) * self%direction < 0.0_wp
+   end function turns_ahead
+
+   !> Whether it does, and makes no difference when in a motion at a velocity [m/s].
+   pure function may_turn_later(self, contact, velocity)
+      class(thermal_ageing_contacts_type), intent(in) :: self
+      integer, intent(in) :: contact
+      real(wp), intent(in) :: velocity
+      logical :: may_turn_later
+
+      may_turn_later = self%turns_ahead(contact) .and. self%turns < max_turns
+      if (may_turn_later) may_turn_later = self%record(row_limit, contact) &
+         & >= self%hazard%turn_limit(velocity)
+   end function may_turn_later
+
+   !> Whether the break of a contact at its threshold can be extrapolated: its force is along the
+   !> motion, and its threshold does not fall.
+   pure function is_extrapolated(self, contact)
+      class(thermal_ageing_contacts_type), intent(in) :: self
+      integer, intent(in) :: contact
+      logical :: is_extrapolated
+
+      is_extrapolated = .not. (self%turns_ahead(contact) &
+         & .or. self%ageing%falls(self%age(age_limit, contact), self%mean_of(contact)))
+   end function is_extrapolated
+
+   !> Extrapolate the break of a contact from its present threshold. The bound on its hazard is
+   !> renewed where it is far below that.
+   subroutine extrapolate(self, contact, pose, key, ahead)
+      class(thermal_ageing_contacts_type), intent(inout) :: self
+      integer, intent(in) :: contact
+      type(pose_type), intent(in) :: pose
+      !> Coordinate of its threshold [m]
+      real(wp), intent(out) :: key
+      !> Coordinate before which no contact breaks [m]
+      real(wp), intent(inout) :: ahead
+
+      real(wp) :: age, here, rate, growth
+      logical :: is_known
+
+      age = pose%time - self%age(age_birth, contact)
+      call self%ageing%evaluate(self%age(age_limit, contact), self%mean_of(contact), age, here, &
+         & rate)
+      if (self%hazard%slope * (here - self%record(row_limit, contact)) > max_growth) then
+         call self%update_deviate(contact)
+         call self%take_out(contact)
+         call self%set_bound(contact, pose)
+         call self%put(contact)
+      end if
+      call self%order(self%ahead)%remove(contact)
+      self%age(age_bound, contact) = here
+      key = self%direction * self%record(row_origin, contact) + here
+      call self%prediction%extrapolate(self%ageing, rate, age, key - self%direction &
+         & * pose%displacement, self%direction * pose%velocity, self%direction, &
+         & tiny_gap * self%stretch, growth, is_known)
+      if (is_known) then
+         ahead = min(ahead, key + growth)
+      else
+         ahead = min(ahead, key)
+      end if
+   end subroutine extrapolate
+
+   !> Add a leader with its bound as a coordinate [m]. Of too many the last is put back.
+   subroutine add_leader(self, contact, key)
+      class(thermal_ageing_contacts_type), intent(inout) :: self
+      integer, intent(in) :: contact
+      real(wp), intent(in) :: key
+
+      integer :: place
+
+      if (self%leaders == max_leaders) then
+         if (.not. key < self%leader_key(1)) then
+            call self%order(self%ahead)%put(contact, key)
+            return
+         end if
+         call self%order(self%ahead)%put(self%leader(1), self%leader_key(1))
+         self%leader(:max_leaders - 1) = self%leader(2:)
+         self%leader_key(:max_leaders - 1) = self%leader_key(2:)
+         self%leaders = max_leaders - 1
+      end if
+      self%leaders = self%leaders + 1
+      do place = self%leaders, 2, -1
+         if (before(key, contact, self%leader_key(place - 1), self%leader(place - 1))) exit
+         self%leader(place) = self%leader(place - 1)
+         self%leader_key(place) = self%leader_key(place - 1)
+      end do
+      self%leader(place) = contact
+      self%leader_key(place) = key
+   end subroutine add_leader
+
+   !> A contact is no leader any more, if it is one.
+   subroutine drop_leader(self, contact)
+      class(thermal_ageing_contacts_type), intent(inout) :: self
+      integer, intent(in) :: contact
+
+      integer :: place
+
+      do place = self%leaders, 1, -1
+         if (self%leader(place) == contact) exit
+      end do
+      if (place == 0) return
+      self%leader(place:self%leaders - 1) = self%leader(place + 1:self%leaders)
+      self%leader_key(place:self%leaders - 1) = self%leader_key(place + 1:self%leaders)
+      self%leaders = self%leaders - 1
+   end subroutine drop_leader
+
+   !> Break the leaders whose thresholds the slider has met, in the order of their bounds.
+   subroutine break_leaders(self, pose)
+      class(thermal_ageing_contacts_type), intent(inout) :: self
+      type(pose_type), intent(in) :: pose
+
+      real(wp) :: met, late
+      integer :: place, contact
+
+      met = self%direction * pose%displacement + tiny_gap * self%stretch
+      do place = self%leaders, 1, -1
+         if (.not. self%leader_key(place) <= met) exit
+         contact = self%leader(place)
+         late = self%direction * (pose%displacement - self%record(row_origin, contact)) &
+            & - self%threshold(contact, pose%time)
+         if (late < -tiny_gap * self%stretch) cycle
+         if (late > tiny_gap * self%stretch) self%error_estimate = max(self%error_estimate, &
+            & late * self%parameters%stiffness)
+         call self%drop_leader(contact)
+         call self%order_renewal%remove(contact)
+         call self%break_contact(contact, pose)
+      end do
+   end subroutine break_leaders
+
+   pure function bound_ahead(self, contact) result(bound)
+      class(thermal_ageing_contacts_type), intent(in) :: self
+      integer, intent(in) :: contact
+      real(wp) :: bound
+
+      bound = self%age(age_bound, contact)
+   end function bound_ahead
+
+   subroutine gather_ahead(self)
+      class(thermal_ageing_contacts_type), intent(inout) :: self
+
+      integer :: place
+
+      do place = 1, self%leaders
+         call self%order(self%ahead)%put(self%leader(place), self%leader_key(place))
+      end do
+      self%leaders = 0
+   end subroutine gather_ahead
 
    !> Only a uniform motion has schedules, as bounds change with the time.
    subroutine plan(self, pose, limit, schedule)
@@ -132,6 +386,7 @@ contains
       class(thermal_ageing_contacts_type), intent(inout) :: self
       integer, intent(in) :: contact
 
+      call self%drop_leader(contact)
       call self%order_renewal%remove(contact)
       call self%thermal_contacts_type%leave(contact)
    end subroutine leave
@@ -141,7 +396,7 @@ contains
       integer, intent(in) :: contact
       type(pose_type), intent(in) :: pose
 
-      self%age(:, contact) = [pose%time, self%record(row_limit, contact), never, 1.0_wp]
+      self%age(:, contact) = [pose%time, self%record(row_limit, contact), never, 1.0_wp, 0.0_wp]
       if (self%is_start) self%age(age_birth, contact) = -self%ageing%initial_age
       call self%set_bound(contact, pose)
    end subroutine begin_life
@@ -204,6 +459,7 @@ contains
             end if
          end if
       end associate
+      self%age(age_bound, contact) = self%record(row_limit, contact)
       call self%order_renewal%set(contact, self%age(age_renewal, contact))
    end subroutine set_bound
 
@@ -224,6 +480,7 @@ contains
          accepts_break = uniform(2) &
             & <= exp(-self%hazard%slope * (here - self%record(row_limit, contact)))
       end if
+      call self%drop_leader(contact)
       if (accepts_break) then
          call self%order_renewal%remove(contact)
          return
@@ -392,17 +649,18 @@ contains
       integer, intent(in) :: contact
       real(wp), intent(in) :: time, configured, attempts
 
-      self%age(:, contact) = [time, configured, never, attempts]
+      self%age(:, contact) = [time, configured, never, attempts, 0.0_wp]
    end subroutine begin_solved
 
-   !> Renew the bounds that are due, and break contacts whose thresholds have fallen to their
-   !> forces.
+   !> Break the leaders that are due, renew the bounds that are due, and break contacts whose
+   !> thresholds have fallen to their forces.
    subroutine update_bounds(self, pose)
       class(thermal_ageing_contacts_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
 
       integer :: contact
 
+      call self%break_leaders(pose)
       do
          contact = self%order_renewal%due(pose%time)
          if (contact == 0) return
@@ -416,6 +674,8 @@ contains
 
       integer :: contact
 
+      self%leaders = 0
+      self%turns = 0
       call self%thermal_contacts_type%rebuild(displacement)
       call self%order_renewal%clear()
       do contact = 1, self%parameters%count
@@ -448,6 +708,15 @@ contains
       call exchange_thermal(self, archive)
       call archive%section("ages of thermal contacts")
       call archive%exchange("age", self%age)
+      call self%prediction%exchange(archive)
    end subroutine exchange
+
+   subroutine shift_order(self, shift)
+      class(thermal_ageing_contacts_type), intent(inout) :: self
+      real(wp), intent(in) :: shift
+
+      call self%thermal_contacts_type%shift_order(shift)
+      call self%prediction%shift(shift)
+   end subroutine shift_order
 
 end module mesoslip_contacts_thermal_ageing

@@ -24,14 +24,15 @@ module mesoslip_contacts_thermal_contacts
 
    public :: thermal_contacts_type, make_thermal_contacts
    ! For kinds that extend this one: a call by a component would lose their own procedures.
-   public :: initialize_thermal, offer_thermal
+   public :: initialize_thermal, offer_thermal, respond_thermal
 
    !> Contacts that break by thermal activation.
    type, extends(thermal_steady_type) :: thermal_contacts_type
    contains
       procedure :: initialize => initialize_thermal
       procedure :: offer => offer_thermal
-      procedure :: respond, plan, settle, join, leave, begin_life, accepts_break, update_bounds
+      procedure :: respond => respond_thermal
+      procedure :: plan, settle, join, leave, begin_life, accepts_break, update_bounds, find_ahead
       procedure, non_overridable :: break_contact
       procedure, non_overridable, private :: break_and_attach, pass_ahead, break_by_clock, &
          & respond_steadily
@@ -113,7 +114,7 @@ contains
       real(wp) :: ahead
 
       law = total_law(self)
-      call self%order(self%ahead)%first(ahead)
+      call self%find_ahead(pose, law, ahead)
       window = self%window_between(self%behind, ahead, self%detached%next_due)
       call self%set_next()
       call self%hazard%offer(pose%displacement, self%clock)
@@ -121,7 +122,7 @@ contains
    end subroutine offer_by_clocks
 
    !> Break all contacts that are due, then attach those that are, in the order in which they broke.
-   subroutine respond(self, before, after)
+   subroutine respond_thermal(self, before, after)
       class(thermal_contacts_type), intent(inout) :: self
       type(pose_type), intent(in) :: before, after
 
@@ -131,7 +132,7 @@ contains
          call self%hazard%advance(self%clock)
          call self%break_and_attach(after)
       end if
-   end subroutine respond
+   end subroutine respond_thermal
 
    !> Break and attach contacts in a uniform motion.
    subroutine respond_steadily(self, pose)
@@ -297,6 +298,17 @@ contains
 
       accepts_break = .true.
    end function accepts_break
+
+   !> Coordinate before which no contact breaks at its threshold, and no force changes its sign.
+   subroutine find_ahead(self, pose, law, ahead)
+      class(thermal_contacts_type), intent(inout) :: self
+      type(pose_type), intent(in) :: pose
+      type(interface_law_type), intent(in) :: law
+      !> The coordinate along the direction of motion [m]
+      real(wp), intent(out) :: ahead
+
+      call self%order(self%ahead)%first(ahead)
+   end subroutine find_ahead
 
    !> Update limits that have changed with the time: none here.
    subroutine update_bounds(self, pose)

@@ -56,6 +56,9 @@ module mesoslip_contacts_thermal_keys
       real(wp) :: velocity = 0.0_wp
    contains
       procedure :: rebuild, shift_order, behind_of, exchange => exchange_thermal
+      !> Bound on the breaking stretch of a contact, and contacts put back that are not in the order
+      !> ahead
+      procedure :: bound_ahead, gather_ahead
       procedure, non_overridable :: put, insert, take_out, change_sign, clear_orders
       procedure, non_overridable :: update_deviate, distance, move_reference, reverse_if_due
       procedure, non_overridable, private :: set_key
@@ -145,7 +148,7 @@ contains
       associate (origin => self%record(row_origin, contact), &
          & limit => self%record(row_limit, contact))
          call self%order(self%ahead)%put(contact, self%direction * origin &
-            & + self%distance(number, limit, self%direction))
+            & + self%distance(number, self%bound_ahead(contact), self%direction))
          call self%order(3 - self%ahead)%put(contact, -(self%direction * origin &
             & - self%distance(number, limit, -self%direction)))
       end associate
@@ -180,6 +183,22 @@ contains
 
       distance = merge(limit, tiny_stretch * self%stretch, force_sign(number) * direction > 0.0_wp)
    end function distance
+
+   !> Bound on the stretch at which a contact breaks in the motion ahead [m]: its limit, but for
+   !> kinds whose limits are older.
+   pure function bound_ahead(self, contact) result(bound)
+      class(thermal_keys_type), intent(in) :: self
+      integer, intent(in) :: contact
+      real(wp) :: bound
+
+      bound = self%record(row_limit, contact)
+   end function bound_ahead
+
+   !> Put contacts that are not in the order ahead back into it: none here.
+   subroutine gather_ahead(self)
+      class(thermal_keys_type), intent(inout) :: self
+
+   end subroutine gather_ahead
 
    !> Also where its force changes its sign.
    pure function behind_of(self, contact) result(coordinate)
@@ -287,6 +306,7 @@ contains
       ! The bound may be that of a contact that has broken since.
       self%behind = -self%order(3 - self%ahead)%lowest()
       if (self%direction * displacement > self%behind) return
+      call self%gather_ahead()
       self%ahead = 3 - self%ahead
       self%direction = -self%direction
       self%behind = -self%order(3 - self%ahead)%lowest()

@@ -1,0 +1,174 @@
+!> Motion of a slider as contacts whose thresholds grow predict it, and where they meet it.
+!>
+!> Acceleration and jerk of the slider follow from the law that it is offered; a bound on the error
+!> of the jerk from recent motions, with a margin.
+module mesoslip_contacts_ageing_prediction
+   use mesoslip_contacts_ageing_law, only: ageing_law_type
+   use mesoslip_interface_law, only: interface_law_type, pose_type
+   use mesoslip_numerics_archive, only: archive_type
+   use mesoslip_numerics_kinds, only: wp
+   implicit none
+   private
+
+   public :: prediction_type
+
+   !> Factor of the last error of the jerk in a bound on the next, factor by which errors decay from
+   !> motion to motion, and minimum relative error
+   real(wp), parameter :: safety = 4.0_wp, memory = 0.99_wp, min_jerk_error = 1.0e-3_wp
+   !> Relative change of the speed of approach up to which the time of a break is a short series
+   real(wp), parameter :: max_excess = 1.0e-5_wp
+   !> The same up to which that series starts Newton's method, and relative change of the time after
+   !> which it ends: the error is the square of that
+   real(wp), parameter :: max_start_excess = 0.2_wp, max_change = 1.0e-6_wp
+   !> Steps of Newton's method, which converges from one side: fewer only make windows shorter
+   integer, parameter :: max_steps = 8
+   !> Maximum duration for which a bound on the displacement is extrapolated [s], and its margin
+   real(wp), parameter :: max_duration = 1.0e9_wp, margin = 1.5_wp
+
+   !> The predicted motion.
+   type :: prediction_type
+      !> Law that was offered last
+      type(interface_law_type) :: law
+      !> Acceleration [m/s2] and jerk under it, the error of the jerk in recent motions, and a bound
+      !> on its error [m/s3]
+      real(wp) :: acceleration = 0.0_wp, jerk = 0.0_wp, jerk_error = 0.0_wp, jerk_bound = 0.0_wp
+   contains
+      procedure, non_overridable :: predict, compare, reach, extrapolate, shift, exchange
+   end type prediction_type
+
+contains
+
+   !> Predict acceleration and jerk of the slider under a law, from its pose with the acceleration
+   !> under the law before.
+   pure subroutine predict(self, pose, law)
+      class(prediction_type), intent(inout) :: self
+      type(pose_type), intent(in) :: pose
+      type(interface_law_type), intent(in) :: law
+
+      real(wp) :: change
+
+      change = (law%stiffness - self%law%stiffness) * pose%displacement &
+         & - (law%offset - self%law%offset) + (law%drag - self%law%drag) * pose%velocity
+      self%law = law
+      self%acceleration = pose%acceleration - pose%inverse_mass * change
+      self%jerk = -(pose%own_rate**2 + pose%inverse_mass * law%stiffness) * pose%velocity &
+         & - pose%inverse_mass * law%drag * self%acceleration
+      ! A drive or a damper may change as fast as the slider itself.
+      self%jerk_bound = safety * self%jerk_error + min_jerk_error * abs(self%jerk) &
+         & + pose%own_rate * (pose%own_rate * abs(pose%velocity) + abs(self%acceleration))
+   end subroutine predict
+
+   !> Compare a motion with its prediction.
+   pure subroutine compare(self, before, after)
+      class(prediction_type), intent(inout) :: self
+      type(pose_type), intent(in) :: before, after
+
+      real(wp) :: duration
+
+      duration = after%time - before%time
+      if (.not. duration > 0.0_wp) return
+      self%jerk_error = max(abs(after%acceleration - self%acceleration - self%jerk * duration) &
+         & / duration, memory * self%jerk_error)
+   end subroutine compare
+
+   !> Coordinate along a direction that the slider does not reach before a time.
+   pure function reach(self, pose, direction, time) result(coordinate)
+      class(prediction_type), intent(in) :: self
+      type(pose_type), intent(in) :: pose
+      !> The direction, +1 or -1, and the time [s]
+      real(wp), intent(in) :: direction, time
+      real(wp) :: coordinate
+
+      real(wp) :: duration, speed
+
+      coordinate = huge(1.0_wp)
+      duration = time - pose%time
+      if (duration > max_duration) return
+      speed = abs(pose%velocity) &
+         & + (abs(self%acceleration) + (abs(self%jerk) + self%jerk_bound) * duration) &
+         & * duration
+      coordinate = direction * pose%displacement + margin * speed * duration
+   end function reach
+
+   !> Growth of a threshold until the slider meets it, not more than it is.
+   !>
+   !> In a time t the slider moves by speed t + pull t^2 + third t^3, with an error that grows as
+   !> t^3, and the threshold grows by about rate t + bend t^2.
+   pure subroutine extrapolate(self, ageing, rate, age, gap, speed, direction, resolution, growth, &
+      & is_known)
+      class(prediction_type), intent(in) :: self
+      type(ageing_law_type), intent(in) :: ageing
+      !> Rate of the threshold [m/s] and age of the contact [s]
+      real(wp), intent(in) :: rate, age
+      !> Distance to the threshold [m]; speed of the slider along a direction [m/s], +1 or -1
+      real(wp), intent(in) :: gap, speed, direction
+      !> Distance below which the slider has met it [m]
+      real(wp), intent(in) :: resolution
+      !> The growth [m]; not set if it cannot be extrapolated
+      real(wp), intent(inout) :: growth
+      logical, intent(out) :: is_known
+
+      real(wp) :: bend, pull, third, error, later_rate, step, excess, slope, change
+      integer :: number
+
+      is_known = .false.
+      if (.not. speed > rate) return
+      slope = 1.0_wp / (speed - rate)
+      step = gap * slope
+      if (.not. step > 0.0_wp) return
+      pull = 0.5_wp * direction * self%acceleration
+      third = (1.0_wp / 6.0_wp) * direction * self%jerk
+      error = (1.0_wp / 6.0_wp) * self%jerk_bound * step**2
+      if (.not. (error < 0.5_wp * speed .and. (abs(pull) + abs(third) * step) * step &
+         & < 0.25_wp * speed)) return
+
+      bend = 0.5_wp * ageing%curvature(rate, age)
+      excess = (pull + third * step - bend) * step * slope
+      if (abs(excess) <= max_excess .and. abs(bend) * step**3 &
+         & <= 0.1_wp * resolution * ageing%time) then
+         step = step * (1.0_wp - excess * (1.0_wp - 2.0_wp * excess))
+         growth = (rate + bend * step) * step
+      else
+         if (abs(excess) < max_start_excess) step = step * (1.0_wp - excess)
+         do number = 1, max_steps
+            call ageing%grow(rate, age, step, growth, later_rate)
+            slope = speed + (2.0_wp * pull + 3.0_wp * third * step) * step - later_rate
+            if (.not. slope > 0.0_wp) return
+            change = (gap + growth - step * (speed + (pull + third * step) * step)) / slope
+            step = max(0.0_wp, step + change)
+            growth = growth + later_rate * change
+            if (abs(change) <= max_change * step) exit
+         end do
+         growth = max(growth, 0.0_wp)
+         ! A slider that slows down arrives later than one at the present speed.
+         slope = 1.0_wp / min(speed - rate, slope)
+         error = (1.0_wp / 6.0_wp) * self%jerk_bound * step**2
+      end if
+      growth = max(0.0_wp, 1.0_wp - error * slope) * growth
+      is_known = .true.
+   end subroutine extrapolate
+
+   !> Let the law that was offered count displacements from another origin.
+   pure subroutine shift(self, distance)
+      class(prediction_type), intent(inout) :: self
+      !> Displacement of the new origin [m]
+      real(wp), intent(in) :: distance
+
+      self%law%offset = self%law%offset - self%law%stiffness * distance
+   end subroutine shift
+
+   !> Write the state to an archive, or read it.
+   subroutine exchange(self, archive)
+      class(prediction_type), intent(inout) :: self
+      type(archive_type), intent(inout) :: archive
+
+      call archive%exchange("stiffness_offered", self%law%stiffness)
+      call archive%exchange("offset_offered", self%law%offset)
+      call archive%exchange("drag_offered", self%law%drag)
+      call archive%exchange("acceleration", self%acceleration)
+      call archive%exchange("jerk", self%jerk)
+      call archive%exchange("jerk_error", self%jerk_error)
+      call archive%exchange("jerk_bound", self%jerk_bound)
+   end subroutine exchange
+
+end module mesoslip_contacts_ageing_prediction

@@ -50,8 +50,9 @@ class Windows:
     @cached_property
     def samples(self) -> Samples:
         """The samples of all windows, one after the other."""
-        shift = self.spread(self.first - self.step * self.starts)
-        return np.asarray(shift + self.step * np.arange(shift.size))
+        samples = self.step * np.arange(self.size.sum())
+        samples += self.spread(self.first - self.step * self.starts)
+        return samples
 
     def max_of(self, values: NDArray[Value]) -> NDArray[Value]:
         """The maximum of values of ``samples`` in each window."""
@@ -64,6 +65,9 @@ class Windows:
 
     def spread(self, values: NDArray[Value]) -> NDArray[Value]:
         """A value for each window as one for each of its samples."""
+        if values.size == 1:
+            # Without copies, as a single window may be long.
+            return np.broadcast_to(values, self.size[0])
         return np.repeat(values, self.size)
 
 

@@ -12,7 +12,8 @@ from made_records import judge, made_record
 from mesoslip.analysis.alternating_extremes import extremes_of
 from mesoslip.analysis.rate_and_state import Loading
 from mesoslip.analysis.regime import SMOOTH, STICK_SLIP
-from mesoslip.analysis.sampled_slips import find_slips
+from mesoslip.analysis.sampled_slips import find_slips, windows
+from mesoslip.analysis.sampled_slips.windows import Windows, lines_through, parabolas_through
 from mesoslip.analysis.stick_phases import stick_phases
 from oracles import Friction, spring_slider
 from scipy.signal import lfilter
@@ -52,6 +53,38 @@ def test_falls_of_all_thresholds_are_those_of_a_walk(seed):
         found = list(zip(values[tops], values[bottoms], strict=True))
         assert found == turns(values, threshold)
         assert (extremes.fall_sizes > threshold).sum() == len(found)
+
+
+def test_lines_and_parabolas_through_windows_are_those_of_numpy():
+    rng = np.random.default_rng(1)
+    time = 5.0 + np.cumsum(rng.random(300))
+    values = 40 + np.cumsum(rng.standard_normal(300))
+    first, size = np.array([0, 12, 200]), np.array([9, 150, 5])
+    at = first + size - 2
+    some = Windows(first, size)
+    lines = lines_through(time, values, some, time[at])
+    parabolas = parabolas_through(time, values, some, at)
+    for number, part in enumerate(np.split(some.samples, some.starts[1:])):
+        line = np.polynomial.Polynomial.fit(time[part], values[part], 1)
+        assert lines.level[number] == pytest.approx(line(time[at[number]]), rel=1e-12)
+        assert lines.slope[number] == pytest.approx(line.deriv()(0.0), rel=1e-9)
+        deviation = np.std(values[part] - line(time[part]))
+        assert lines.deviation[number] == pytest.approx(deviation, rel=1e-9)
+        curve = np.polynomial.Polynomial.fit(time[part], values[part], 2)
+        assert parabolas[number] == pytest.approx(curve(time[at[number]]), rel=1e-12)
+
+
+def test_slips_do_not_depend_on_how_many_samples_are_evaluated_at_once(monkeypatch):
+    time = 0.001 * np.arange(1500)
+    force = np.minimum(time % 0.12, 6 * (0.12 - time % 0.12))
+    force += 0.004 * np.random.default_rng(2).standard_normal(1500)
+    found = find_slips(time, force)
+    monkeypatch.setattr(windows, "MAX_SAMPLES", 20)
+    again = find_slips(time, force)
+    assert len(found) == 12
+    np.testing.assert_array_equal(found.start_time, again.start_time)
+    np.testing.assert_array_equal(found.counts.mirrored_count, again.counts.mirrored_count)
+    np.testing.assert_allclose(found.force_before, again.force_before, rtol=1e-12)
 
 
 NOISES = {

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import gzip
 
+import h5py
 import mesoslip
+import nptdms
 import numpy as np
 import pytest
 from mesoslip.errors import FileError
+from mesoslip.measured import measured_record, thinning
 from mesoslip.measured.reading import blocks
 
 RATE, COUNT = 1000.0, 30000
@@ -18,6 +21,29 @@ def written(path, force, time=TIME):
     lines = [f"{one:.6f},{two:.6f}" for one, two in zip(time, force, strict=True)]
     text = "\n".join(["time [s],force [N]", *lines]) + "\n"
     path.write_bytes(gzip.compress(text.encode()) if path.suffix == ".gz" else text.encode())
+    return path
+
+
+def written_hdf5(path, force):
+    """Two arrays, or for MATLAB one of two columns after the 512 bytes of a header."""
+    is_matlab = path.suffix == ".mat"
+    with h5py.File(path, "w", userblock_size=512 * is_matlab) as file:
+        if is_matlab:
+            file["data"] = np.stack([TIME, force])
+        else:
+            file.create_dataset("time", data=TIME, chunks=(7000,)).attrs["units"] = "s"
+            file.create_dataset("force", data=force).attrs["units"] = "N"
+    if is_matlab:
+        with path.open("r+b") as file:
+            file.write(b"MATLAB 7.3 MAT-file")
+    return path
+
+
+def written_tdms(path, force):
+    with nptdms.TdmsWriter(path) as file:
+        for part in np.array_split(force, 7):
+            properties = {"wf_increment": 1 / RATE, "unit_string": "N"}
+            file.write_segment([nptdms.ChannelObject("Untitled", "force", part, properties)])
     return path
 
 
@@ -61,6 +87,36 @@ def test_blocks_make_no_difference(monkeypatch, tmp_path):
     path.write_text("\n".join(lines))
     with pytest.raises(FileError, match=r"line 20001.*'hello', is not a number"):
         mesoslip.read_trace(path, rate="20 Hz")
+
+
+@pytest.mark.parametrize("name", ["a.h5", "a.mat", "a.tdms"])
+def test_binary_files_are_read_block_by_block(name, tmp_path, monkeypatch):
+    """The same record as from a text; a block of 4000 rows is thinned before the next is read."""
+    force = np.round(5 + np.random.default_rng(1).standard_normal(COUNT), 6)
+    expected = mesoslip.read_trace(written(tmp_path / "a.csv", force), rate="20 Hz")
+    steps = []
+    read, feed = measured_record.blocks_of, thinning._Thinner.feed
+
+    def observed(*arguments, **options):
+        for table in read(*arguments, **options):
+            steps.append(table.values.shape)
+            yield table
+
+    def fed(self, table):
+        steps.append("thinned")
+        return feed(self, table)
+
+    monkeypatch.setattr(blocks, "BLOCK", 16 * 4000)
+    monkeypatch.setattr(measured_record, "blocks_of", observed)
+    monkeypatch.setattr(thinning._Thinner, "feed", fed)
+    write = written_tdms if name.endswith("tdms") else written_hdf5
+    path = write(tmp_path / name, force)
+    known = {"columns": "time [s], force [N]"} if name.endswith("mat") else {}
+    tree = mesoslip.read_trace(path, rate="20 Hz", **known)
+    assert steps[:-2] == [(2, 4000), "thinned"] * 7
+    for one in ("time", "spring_force"):
+        np.testing.assert_allclose(tree[one].values, expected[one].values, rtol=1e-9, atol=1e-9)
+    assert "thinned: every 50th of 30000 rows, 20 Hz" in tree.attrs["understood"]
 
 
 @pytest.mark.usefixtures("small_blocks")

@@ -52,6 +52,10 @@ class Extremes:
         """Number of differences up to a threshold: the falls above thresholds of one rank agree."""
         return int(np.searchsorted(self._sizes, threshold, side="right"))
 
+    def has_falls(self, threshold: float) -> bool:
+        """Whether there are falls above a threshold."""
+        return self.fall_sizes.size > 0 and bool(self.fall_sizes[-1] > threshold)
+
     def falls(self, threshold: float) -> tuple[Samples, Samples]:
         """Samples of the maximum and of the minimum of each fall above a threshold.
 
@@ -97,7 +101,7 @@ def _without_inner_cycles(values: Array, at: Samples, min_size: float) -> tuple[
     found = [np.empty((0, 2), dtype=int)]
     while at.size > MIN_POINTS:
         sizes = np.abs(np.diff(values[at]))
-        inner = 1 + np.flatnonzero((sizes[1:-1] < sizes[:-2]) & (sizes[1:-1] < sizes[2:]))
+        inner = 1 + np.flatnonzero((sizes[1:-1] < sizes[:-2]) & (sizes[1:-1] <= sizes[2:]))
         if inner.size == 0:
             break
         large = inner[sizes[inner] >= min_size]

@@ -183,10 +183,11 @@ def predict_traces(simulations: Simulations, points: Array) -> tuple[Array, tupl
     slips: list[list[FoundSlips]] = [[] for _ in experiments]
     predicted = []
     for traces in simulations.forces(points):
-        predicted.append(simulator.summarized(traces))
+        found = simulator.slips(traces)
+        predicted.append(simulator.summarized(traces, found))
         for number, force in enumerate(traces):
             forces[number].append(force[:: strides[number]].astype(np.float32))
-            slips[number].append(experiments[number].summarizer.slips(force))
+            slips[number].append(found[number])
     return np.array(predicted), tuple(
         Prediction(
             one,

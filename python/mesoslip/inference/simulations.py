@@ -12,6 +12,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from mesoslip.analysis.sampled_slips import FoundSlips
 from mesoslip.execution.executors import ExecutorLike, as_executor, completed
 from mesoslip.execution.pool import Function, Result
 from mesoslip.execution.program import program
@@ -89,12 +90,17 @@ class Simulator:
         forces = self.forces(piece, stop)
         if forces is None:
             return np.full(len(self.features), np.nan)
-        return self.summarized(forces)
+        return self.summarized(forces, self.slips(forces))
 
-    def summarized(self, forces: Sequence[Array]) -> Array:
-        """Summaries of traces [N], one an experiment."""
+    def slips(self, forces: Sequence[Array]) -> list[FoundSlips]:
+        """Slips of traces [N], one an experiment."""
         pairs = zip(self.experiments, forces, strict=True)
-        return np.concatenate([one.summarizer(force) for one, force in pairs])
+        return [one.summarizer.slips(force) for one, force in pairs]
+
+    def summarized(self, forces: Sequence[Array], slips: Sequence[FoundSlips]) -> Array:
+        """Summaries of traces [N], one an experiment, with their slips."""
+        every = zip(self.experiments, forces, slips, strict=True)
+        return np.concatenate([one.summarizer(force, found) for one, force, found in every])
 
     def fingerprint(self, observed: Array) -> str:
         """A hash of everything that determines the simulations of a fit."""

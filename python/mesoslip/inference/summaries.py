@@ -15,8 +15,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from mesoslip.analysis.alternating_extremes import Samples
 from mesoslip.analysis.power_spectrum import power_spectrum
 from mesoslip.analysis.sampled_slips import FoundSlips
+from mesoslip.analysis.sampled_slips.windows import Windows, lines_through
 from mesoslip.analysis.strokes import Piece, find_slips_between_reversals
 from mesoslip.inference.features import (
     BANDS,
@@ -110,9 +112,12 @@ class Summarizer:
             direction=self.direction,
         )
 
-    def __call__(self, force: Array) -> Array:
-        """The summaries of a trace of the force [N], shape (samples,); NaN if undefined."""
-        found = self.slips(force)
+    def __call__(self, force: Array, found: FoundSlips | None = None) -> Array:
+        """The summaries of a trace of the force [N], shape (samples,); NaN if undefined.
+
+        Its slips may be given, if they are known.
+        """
+        found = self.slips(force) if found is None else found
         force = self.direction * force / self.scale
         values: dict[str, float] = {"slip_count": math.log(len(found) + 0.5)}
         first = int(found.first[0]) if len(found) else _loaded(force)
@@ -155,7 +160,7 @@ class Summarizer:
             drop = self.direction * (found.force_before[0] - found.force_after[0]) / self.scale
             values["first_drop"] = math.log(max(drop, TINY))
             values["first_rate"] = math.log(max(found.fall_rate[0] / self.scale, TINY))
-            waveform = self._waveform(force, int(found.first[0]), int(found.last[0]))
+            (waveform,) = self._waveforms(force, found.first[:1], found.last[:1])
             values |= {
                 f"first_waveform_{at:+.2f}": value
                 for at, value in zip(WAVEFORM, waveform, strict=True)
@@ -210,9 +215,7 @@ class Summarizer:
         else:
             values["return_map"] = 0.0
         values |= self._loading(force, found, drop, later.start)
-        ends = zip(found.first[later], found.last[later], strict=True)
-        waveforms = [self._waveform(force, int(first), int(last)) for first, last in ends]
-        mean = np.mean(waveforms, axis=0)
+        mean = self._waveforms(force, found.first[later], found.last[later]).mean(axis=0)
         return values | {
             f"waveform_{at:+.2f}": value for at, value in zip(WAVEFORM, mean, strict=True)
         }
@@ -221,46 +224,46 @@ class Summarizer:
         self, force: Array, found: FoundSlips, drop: Array, start: int
     ) -> dict[str, float]:
         """Slope of the loading between slips, and creep before slips, from their medians."""
-        slopes, creep = [], []
-        for number in range(max(start, 1), len(found)):
-            first, last = int(found.last[number - 1]), int(found.first[number])
-            # After the ringing, if there is time.
-            settled = min(first + round(2 * self.period / self._interval), (first + last) // 2)
-            ends = [settled + part * (last - settled) for part in LINEAR_PART]
-            low, high = math.ceil(ends[0]), math.floor(ends[1])
-            if high - low < MIN_LOADING_SAMPLES:
-                continue
-            span = slice(low, high)
-            slope, level = np.polyfit(self.time[span] - self.time[low], force[span], 1)
-            slopes.append(slope)
-            size = math.exp(drop[number])
-            half = max(1, (last - settled) // 40)
-            below = []
-            for lag in CREEP_LAGS:
-                at = round(settled + lag * (last - settled))
-                near = slice(at - half, at + half + 1)
-                line = level + slope * (self.time[near] - self.time[low])
-                below.append(float(np.mean(line - force[near])) / size)
-            creep.append(below)
-        if len(slopes) < MIN_SLIPS:
+        start = max(start, 1)
+        first, last = found.last[start - 1 : -1], found.first[start:]
+        # After the ringing, if there is time.
+        ringing = round(2 * self.period / self._interval)
+        settled = np.minimum(first + ringing, (first + last) // 2)
+        low, high = (settled + part * (last - settled) for part in LINEAR_PART)
+        low, high = np.ceil(low).astype(int), np.floor(high).astype(int)
+        kept = high - low >= MIN_LOADING_SAMPLES
+        if np.count_nonzero(kept) < MIN_SLIPS:
             return {}
-        values = {"stick_slope": math.log(max(float(np.median(slopes)), TINY))}
-        medians = np.median(creep, axis=0)
+        low, high, settled, last = (one[kept] for one in (low, high, settled, last))
+        begin, size = self.time[low], np.exp(drop[start:][kept])
+        lines = lines_through(self.time, force, Windows(low, high - low), begin)
+        half = np.maximum(1, (last - settled) // 40)
+        creep = []
+        for lag in CREEP_LAGS:
+            at = np.round(settled + lag * (last - settled)).astype(int)
+            near = Windows(at - half, 2 * half + 1)
+            means = [near.mean_of(one[near.samples]) for one in (self.time, force)]
+            creep.append((lines.level + lines.slope * (means[0] - begin) - means[1]) / size)
+        values = {"stick_slope": math.log(max(float(np.median(lines.slope)), TINY))}
+        medians = np.median(creep, axis=1)
         return values | {
             f"creep_{lag:g}": float(one) for lag, one in zip(CREEP_LAGS, medians, strict=True)
         }
 
-    def _waveform(self, force: Array, first: int, last: int) -> Array:
-        """Force at the points `WAVEFORM` of a slip."""
+    def _waveforms(self, force: Array, first: Samples, last: Samples) -> Array:
+        """Force at the points `WAVEFORM` of slips, shape (slips, points)."""
+        slips = Windows(first, last - first + 1)
         half = (force[first] + force[last]) / 2
-        below = first + int(np.argmax(force[first : last + 1] <= half))
-        above = max(below - 1, 0)
+        lower = np.flatnonzero(force[slips.samples] <= slips.spread(half))
+        below = slips.samples[lower[np.searchsorted(lower, slips.starts)]]
+        above = np.maximum(below - 1, 0)
         step = force[above] - force[below]
+        falls = step > 0
         start = self.time[above]
-        if step > 0:
-            start += (force[above] - half) / step * self._interval
-        waveform: Array = np.interp(start + WAVEFORM * self.period, self.time, force)
-        return waveform
+        start[falls] += ((force[above] - half)[falls] / step[falls]) * self._interval
+        points = start[:, np.newaxis] + WAVEFORM * self.period
+        waveforms: Array = np.interp(points, self.time, force)
+        return waveforms
 
 
 def _loaded(force: Array) -> int:

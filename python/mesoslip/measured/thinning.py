@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,7 +47,7 @@ def thinned(blocks: Iterator[Table], rate: float, assigned: Callable[[Table], As
     thinner = _Thinner(time.index, every, _usual_step(known))
 
     def cleaned() -> Iterator[Table]:
-        for table in (first, *blocks):
+        for table in chain([first], blocks):
             for one in used.values():
                 missing, _ = sentinels(table, one)
                 table.values[one.index, missing] = np.nan

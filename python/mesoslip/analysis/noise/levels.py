@@ -44,13 +44,15 @@ def noise_level(force: Array) -> float:
     `correlated_noise` finds it.
     """
     found = []
+    differences = force
     for order in ORDERS:
         if len(force) <= 2 * order:
             break
         # Sum of squares of the binomial coefficients.
         norm = math.sqrt(math.comb(2 * order, order))
-        sizes = np.abs(np.diff(force, order))
-        found.append(float(np.median(sizes)) / (NORMAL_MEDIAN * norm))
+        differences = np.diff(differences)
+        middle = float(np.median(np.abs(differences), overwrite_input=True))
+        found.append(middle / (NORMAL_MEDIAN * norm))
     return max(min(found, default=0.0), digital_step_of(force) / math.sqrt(12))
 
 

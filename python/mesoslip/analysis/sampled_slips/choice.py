@@ -101,8 +101,9 @@ def _at(level: Level) -> Choice:
     mirror = level.mirror()
     for number in reversed(range(steps)):
         threshold = level.floor * THRESHOLD_RATIO**number
-        steep_count, mirrored = level.trace.steep_count(threshold), mirror.steep_count(threshold)
-        rows.append((threshold, level.slips(threshold)[0].size, steep_count, mirrored))
+        slip_count, steep_count = level.trace.numbers(threshold)
+        mirrored = mirror.numbers(threshold)[1]
+        rows.append((threshold, slip_count, steep_count, mirrored))
         if mirrored > max(MAX_NOISE, steep_count / 2):
             break
     thresholds: Array = np.array([one[0] for one in rows[::-1]])
@@ -151,6 +152,10 @@ def _is_clock(times: Array) -> bool:
         return False
     times = times[:MAX_EVENTS] - times[0]
     near, width = 1 / float(np.median(np.diff(times))), 1 / float(times[-1])
-    frequencies = np.arange(0.8 * near, 1.2 * near, width / 4)
-    phases = [abs(np.exp(2j * math.pi * one * times).mean()) for one in frequencies.tolist()]
-    return bool(max(phases) > MAX_COHERENCE)
+    phases = np.exp(2j * math.pi * 0.8 * near * times)
+    turn = np.exp(2j * math.pi * width / 4 * times)
+    for _ in range(math.ceil(1.6 * near / width)):
+        if abs(phases.sum()) > MAX_COHERENCE * times.size:
+            return True
+        phases *= turn
+    return False

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from mesoslip.analysis.alternating_extremes import Samples
 from mesoslip.analysis.sampled_slips.levels import Level
+from mesoslip.analysis.sampled_slips.windows import Windows, lines_through, parabolas_through
 
 Array = NDArray[np.float64]
 
@@ -63,30 +64,43 @@ def fall_rates(level: Level, period: float, tops: Samples, bottoms: Samples) -> 
 
 
 def ends_of(
-    time: Array, force: Array, top: int, bottom: int, noise: float, half: int
-) -> tuple[float, float, float, float]:
-    """Samples of start and end of a slip, and the forces there, averaged over the noise."""
+    time: Array, force: Array, tops: Samples, bottoms: Samples, noise: float, half: Samples
+) -> tuple[Samples, Array, Array]:
+    """Samples at which slips start, and the forces at both ends, averaged over the noise.
+
+    ``half`` is half a period in samples, for each slip.
+    """
     # The force grows slowly before a slip, so that noise determines which sample is the maximum.
     # The level is that of a line through the samples before, and the slip starts where means over
     # some samples fall below it.
-    wide = max(1, min(half // 4, (bottom - top) // 3))
-    low = max(0, top - max(4, half))
-    level, noise_there = float(force[top]), noise
-    if noise > 0 and top - low >= 3:
+    wide = np.maximum(1, np.minimum(half // 4, (bottoms - tops) // 3))
+    lows = np.maximum(0, tops - np.maximum(4, half))
+    level, deviation = force[tops], np.full(tops.size, noise)
+    has_line = np.flatnonzero((noise > 0) & (tops - lows >= 3))
+    if has_line.size:
         # Without the maximum, which is biased by its noise.
-        span = slice(low, top)
-        slope, fitted = np.polyfit(time[span] - time[top], force[span], 1)
-        residual = float(np.std(force[span] - fitted - slope * (time[span] - time[top])))
+        top = tops[has_line]
+        before = Windows(lows[has_line], top - lows[has_line])
+        lines = lines_through(time, force, before, time[top])
         # Ringing before the slip does not follow a straight line.
-        if residual < 2 * noise:
-            level, noise_there = min(float(fitted), level), residual
-    means = np.convolve(force[top : bottom + wide], np.full(wide, 1 / wide), "valid")
+        is_straight = lines.deviation < 2 * noise
+        some = has_line[is_straight]
+        level[some] = np.minimum(lines.level[is_straight], level[some])
+        deviation[some] = lines.deviation[is_straight]
     # Not below the middle of the fall, however strong the noise.
-    least = max(level - 2 * noise_there / math.sqrt(wide), (level + float(force[bottom])) / 2)
-    high = np.flatnonzero(means >= least)
-    start = min(top + (int(high[-1]) if high.size else 0), bottom - 1)
-    around = slice(max(start, bottom - max(1, half // 8)), bottom + max(1, half // 8) + 1)
-    after = float(force[bottom])
-    if noise > 0 and force[around].size >= 4:
-        after = float(np.polynomial.Polynomial.fit(time[around], force[around], 2)(time[bottom]))
-    return float(start), float(bottom), float(level), after
+    least = np.maximum(level - 2 * deviation / np.sqrt(wide), (level + force[bottoms]) / 2)
+    starts = np.empty_like(tops)
+    columns = (one.tolist() for one in (tops, bottoms, wide, least))
+    for number, (top, bottom, width, lowest) in enumerate(zip(*columns, strict=True)):
+        means = np.convolve(force[top : bottom + width], np.full(width, 1 / width), "valid")
+        high = np.flatnonzero(means >= lowest)
+        starts[number] = min(top + (int(high[-1]) if high.size else 0), bottom - 1)
+    near = np.maximum(1, half // 8)
+    first = np.maximum(starts, bottoms - near)
+    size = np.minimum(bottoms + near + 1, force.size) - first
+    after = force[bottoms]
+    curved = np.flatnonzero((noise > 0) & (size >= 4))
+    if curved.size:
+        around = Windows(first[curved], size[curved])
+        after[curved] = parabolas_through(time, force, around, bottoms[curved])
+    return starts, level, after

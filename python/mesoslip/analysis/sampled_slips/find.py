@@ -87,18 +87,15 @@ def find_slips(
     else:
         level = _level_of(every(min_fall=min_fall), min_fall)
         tops, bottoms = level.trace.exceeding(min_fall)
-        counts = counts.with_row(min_fall, tops.size, level.mirror().steep_count(min_fall))
+        counts = counts.with_row(min_fall, tops.size, level.mirror().numbers(min_fall)[1])
     if tops.size == 0:
         return _none(period, min_fall, counts)
     if period is None:
         period = fall_period(time, level.trace.force, tops, bottoms)
     rates = fall_rates(level, period, tops, bottoms)
-    rows = [
-        ends_of(time, cleaned, top, bottom, sigma, level.half_samples(top, period))
-        for top, bottom in level.on_samples(cleaned, tops, bottoms)
-    ]
-    start, end, before, after = np.array(rows).T
-    first, last = start.astype(int), end.astype(int)
+    tops, last = level.on_samples(cleaned, tops, bottoms)
+    half = level.half_samples(tops, period)
+    first, before, after = ends_of(time, cleaned, tops, last, sigma, half)
     return FoundSlips(
         time[first],
         time[last],

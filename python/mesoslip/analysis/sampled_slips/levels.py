@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 
 from mesoslip.analysis.alternating_extremes import Extremes, Samples, extremes_of
 from mesoslip.analysis.noise import Part, TraceNoise, parts_of
+from mesoslip.analysis.sampled_slips.ratios import Ratios
+from mesoslip.analysis.sampled_slips.windows import Windows
 
 Array = NDArray[np.float64]
 
@@ -32,10 +34,7 @@ MIN_FALL_RATIO = 2.0
 MIN_RATE = 0.02
 # Maximum duration of a rebound over that of the fall after it, half a period of the setup.
 REBOUND = 1.5
-# Part below the maximum, over the smaller one of rise and fall, in which their durations are
-# compared, and maximum of the ratio.
-UPPER, MAX_RATIO = (0.1, 0.5), 100.0
-# Minimum of that ratio: slower falls are responses of smooth sliding.
+# Minimum duration of the rise over that of the fall: slower ones are responses of smooth sliding.
 MIN_RATIO = 0.5
 # Samples, and widths of the median, over which the slope of the trace is measured.
 SLOPE_SAMPLES, SLOPE_WIDTHS = 8, 2
@@ -58,25 +57,24 @@ class Side:
     """Rates of rises after narrower medians [N/s]: wide ones flatten those between small slips."""
     original: Side | None = None
     """The trace, of a mirror image."""
-    _falls: dict[float, tuple[Samples, Samples]] = field(init=False, default_factory=dict)
     _excess: dict[int, tuple[Samples, Samples, Array]] = field(init=False, default_factory=dict)
-    _ratios: dict[tuple[int, int], float] = field(init=False, default_factory=dict)
-    _before: dict[tuple[int, int], int] = field(init=False, default_factory=dict)
 
     @cached_property
     def extremes(self) -> Extremes:
         """Alternating extremes for all thresholds."""
         return extremes_of(self.force, self.min_size)
 
+    @cached_property
+    def _ratios(self) -> Ratios:
+        return Ratios(self.time, self.force)
+
     def falls(self, threshold: float) -> tuple[Samples, Samples]:
         """Samples of maximum and minimum of falls above a threshold, but for very slow ones."""
-        if threshold not in self._falls:
-            tops, bottoms = self.exceeding(threshold)
-            duration = self.time[bottoms] - self.time[tops]
-            rates = (self.force[tops] - self.force[bottoms]) / duration
-            kept = rates >= MIN_RATE * self._deepest_rate
-            self._falls[threshold] = tops[kept], bottoms[kept]
-        return self._falls[threshold]
+        tops, bottoms = self.exceeding(threshold)
+        duration = self.time[bottoms] - self.time[tops]
+        rates = (self.force[tops] - self.force[bottoms]) / duration
+        kept = rates >= MIN_RATE * self._deepest_rate
+        return tops[kept], bottoms[kept]
 
     def exceeding(
         self, threshold: float, *, with_rebounds: bool = False
@@ -89,20 +87,22 @@ class Side:
         if rank not in self._excess:
             self._excess[rank] = self._excess_of(*self.extremes.falls(threshold))
         tops, bottoms, excess = self._excess[rank]
-        kept = tops > 0 if with_rebounds else excess > threshold
+        if with_rebounds:
+            return tops, bottoms
+        kept = excess > threshold
         return tops[kept], bottoms[kept]
 
     def _excess_of(self, tops: Samples, bottoms: Samples) -> tuple[Samples, Samples, Array]:
-        """Falls in their order, and their depths without those of the rebounds before."""
-        force, excess = self.force, np.full(tops.size, -np.inf)
-        low = int(np.argmin(force[: tops[0] + 1])) if tops.size else 0
-        for at, (top, bottom) in enumerate(zip(tops.tolist(), bottoms.tolist(), strict=True)):
-            if top > 0:
-                self._before[top, bottom] = low
-                rebound = self._rebound(low, top, bottom)
-                excess[at] = force[top] - force[bottom] - MIN_FALL_RATIO * rebound
-            low = bottom
-        return tops, bottoms, excess
+        """Falls with a start, and their depths without those of the rebounds before."""
+        if tops.size == 0:
+            return tops, bottoms, np.empty(0)
+        force = self.force
+        lows = np.concatenate([[np.argmin(force[: tops[0] + 1])], bottoms[:-1]])
+        if tops[0] == 0:
+            tops, bottoms, lows = tops[1:], bottoms[1:], lows[1:]
+        self._ratios.add(tops, bottoms, lows)
+        depth = force[tops] - force[bottoms]
+        return tops, bottoms, depth - MIN_FALL_RATIO * self._rebounds(lows, tops, bottoms)
 
     @cached_property
     def _deepest_rate(self) -> float:
@@ -117,50 +117,41 @@ class Side:
         at = int(np.argmax(drop))
         return float(drop[at] / (self.time[bottoms[at]] - self.time[tops[at]]))
 
-    def _rebound(self, low: int, top: int, bottom: int) -> float:
-        """Rise just before a fall beyond that by loading, as of ringing and impulses.
+    def _rebounds(self, lows: Samples, tops: Samples, bottoms: Samples) -> Array:
+        """Rises just before falls beyond that by loading, as of ringing and impulses.
 
         A slider at rest is loaded at a constant rate at most, and one that rings rises by the
         amplitude in half a period. Noise, which increases the difference of a maximum and a
         minimum, is subtracted.
         """
-        time = self.time
-        duration = REBOUND * (time[bottom] - time[top])
+        rises = np.zeros(tops.size)
+        if math.isinf(self._loading) or tops.size == 0:
+            return rises
+        time, force = self.time, self.force
+        duration: Array | float = REBOUND * (time[bottoms] - time[tops])
         if self.period is not None:
             duration = 0.5 * REBOUND * self.period
-        first = max(low, int(np.searchsorted(time, time[top] - duration)))
-        if math.isinf(self._loading):
-            return 0.0
-        since = slice(first, top + 1)
-        loading = MAX_LOADING * self._loading * (time[top] - time[since])
-        rise = float(np.max(self.force[top] - self.force[since] - loading))
-        return max(rise - self.floor / 2, 0.0)
+        first = np.maximum(lows, np.searchsorted(time, time[tops] - duration))
+        for some, block in Windows(first, tops - first + 1).blocks():
+            end, since = block.spread(tops[some]), block.samples
+            loading = MAX_LOADING * self._loading * (time[end] - time[since])
+            rises[some] = block.max_of(force[end] - force[since] - loading)
+        return np.maximum(rises - self.floor / 2, 0.0)
 
     def ratios(self, tops: Samples, bottoms: Samples) -> Array:
         """Duration of the rise before each fall over that of the fall, in the upper part."""
-        pairs = list(zip(tops.tolist(), bottoms.tolist(), strict=True))
-        for one in pairs:
-            if one not in self._ratios:
-                self._ratios[one] = self._ratio(*one)
-        return np.array([self._ratios[one] for one in pairs])
+        return self._ratios.of(tops, bottoms)
 
-    def steep_count(self, threshold: float) -> int:
-        """Number of falls much faster than the rises before.
+    def numbers(self, threshold: float) -> tuple[int, int]:
+        """Numbers of slips above a threshold, and of falls much faster than the rises before.
 
-        Those of the mirror image are of noise, which makes as many in both.
+        Steep falls of the mirror image are of noise, which makes as many in both.
         """
-        return int(np.count_nonzero(self.ratios(*self.falls(threshold)) >= 1 / MIN_RATIO))
-
-    def _ratio(self, top: int, bottom: int) -> float:
-        force, time, before = self.force, self.time, self._before[top, bottom]
-        rise, fall = force[before : top + 1][::-1], force[top : bottom + 1]
-        height = min(force[top] - force[before], force[top] - force[bottom])
-        durations = []
-        for values, way in ((rise, -1), (fall, 1)):
-            low = int(np.argmax(values <= force[top] - UPPER[1] * height))
-            high = low - 1 - int(np.argmax(values[:low][::-1] >= force[top] - UPPER[0] * height))
-            durations.append(abs(float(time[top + way * low] - time[top + way * high])))
-        return min(MAX_RATIO, durations[0] / durations[1])
+        if not self.extremes.has_falls(threshold):
+            return 0, 0
+        ratios = self.ratios(*self.falls(threshold))
+        is_slip, is_steep = ratios >= MIN_RATIO, ratios >= 1 / MIN_RATIO
+        return int(np.count_nonzero(is_slip)), int(np.count_nonzero(is_steep))
 
     @property
     def _loading(self) -> float:
@@ -212,24 +203,29 @@ class Level:
         kept = self.trace.ratios(tops, bottoms) >= MIN_RATIO
         return tops[kept], bottoms[kept]
 
-    def on_samples(
-        self, force: Array, tops: Samples, bottoms: Samples
-    ) -> Iterator[tuple[int, int]]:
-        """Samples of the maximum and minimum of each fall in the trace before the median."""
-        last = 0
-        for top, bottom in zip(tops.tolist(), bottoms.tolist(), strict=True):
-            part = next(one for one in self.parts if top < one.after)
-            reach = round(self.width / part.interval) // 2
+    def on_samples(self, force: Array, tops: Samples, bottoms: Samples) -> tuple[Samples, Samples]:
+        """Samples of maximum and minimum of falls in the trace before the median."""
+        last, found = 0, []
+        reaches = np.round(self.width / self._intervals(tops)).astype(int) // 2
+        columns = (one.tolist() for one in (tops, bottoms, reaches))
+        for top, bottom, reach in zip(*columns, strict=True):
             start = min(max(last, top - reach), bottom - 1)
             top = start + int(np.argmax(force[start : min(top + reach, bottom - 1) + 1]))
             # The median removes sharp minima: in the force, the first of ringing may be lowest.
             last = top + 1 + int(np.argmin(force[top + 1 : bottom + reach + 1]))
-            yield top, last
+            found.append((top, last))
+        first, after = np.array(found, dtype=int).reshape(-1, 2).T
+        return first, after
 
-    def half_samples(self, at: int, period: float) -> int:
-        """Samples in half a period, at a sample."""
-        part = next(one for one in self.parts if at < one.after)
-        return max(1, round(period / 2 / part.interval))
+    def half_samples(self, at: Samples, period: float) -> Samples:
+        """Samples in half a period, at some samples."""
+        half: Samples = np.maximum(1, np.round(period / 2 / self._intervals(at)).astype(int))
+        return half
+
+    def _intervals(self, at: Samples) -> Array:
+        """Sampling intervals at some samples [s]."""
+        part = np.searchsorted([one.after for one in self.parts], at, side="right")
+        return np.array([one.interval for one in self.parts])[part]
 
 
 def levels(

@@ -121,7 +121,7 @@ def monotone_pieces(displacement: Array) -> tuple[Piece, ...] | None:
     if known.size < 4:
         return None
     values = displacement[known] - displacement[known[0]]
-    noise = _range_of_noise(values)
+    noise = _range_of_noise(values, noise_level(values))
     extremes = extremes_of(values)
     threshold = _min_swing(values, extremes, noise)
     if threshold is None:
@@ -163,7 +163,8 @@ def pieces_of_force(
     if not (is_signed or is_given):
         return None
     middle, half = (low + high) / 2, (high - low) / 2
-    if 2 * half * (1 - BEYOND) < _range_of_noise(force) / 2:
+    level = noise_level(force)
+    if 2 * half * (1 - BEYOND) < _range_of_noise(force, level) / 2:
         return None
     side = np.where(force > middle + BEYOND * half, 1, 0)
     side[force < middle - BEYOND * half] = -1
@@ -177,7 +178,7 @@ def pieces_of_force(
     rise, fall = float(np.median(took[rising])), float(np.median(took[~rising]))
     if not (is_given or 1 / MAX_ASYMMETRY <= rise / fall <= MAX_ASYMMETRY):
         return None
-    noise = 3 * noise_level(force)
+    noise = 3 * level
     # The force leaves its level as long before as it would take at this rate.
     bounds: list[int] = []
     for one, two in zip(last.tolist(), next_one.tolist(), strict=True):
@@ -193,9 +194,8 @@ def pieces_of_force(
     )
 
 
-def _range_of_noise(values: Array) -> float:
-    """Range that the noise of a record hardly exceeds."""
-    level = noise_level(values)
+def _range_of_noise(values: Array, level: float) -> float:
+    """Range that noise of a standard deviation hardly exceeds in a record."""
     return max(
         (2 * math.sqrt(2 * math.log(values.size)) + 1) * level, MIN_RANGE * float(np.ptp(values))
     )

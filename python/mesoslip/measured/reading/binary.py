@@ -30,14 +30,18 @@ COMPRESSED = 15
 UNPACKED_BYTES = 2**20
 
 
+# Slices of the axes of an array.
+Part = tuple[slice, ...]
+
+
 class Found(NamedTuple):
-    """An array of a file, which is read when it is loaded: its name with those of its groups, its
-    unit, and a longer name."""
+    """An array of a file, a part of which is read when it is loaded: its name with those of its
+    groups, its unit, and a longer name."""
 
     name: str
     shape: tuple[int, ...]
     dtype: np.dtype[Any]
-    load: Callable[[], Any]
+    load: Callable[[Part], Any]
     unit: str = ""
     long_name: str = ""
 
@@ -57,12 +61,13 @@ class Found(NamedTuple):
     def rows(self) -> int:
         return max(self.axes)
 
-    def values(self) -> Any:
-        """Its columns, shape (columns, rows)."""
-        values = np.asarray(self.load()).reshape(self.axes)
-        if values.ndim == 2 and values.shape[0] >= values.shape[1]:
-            values = values.T
-        return values.reshape(self.columns, self.rows)
+    def values(self, rows: slice) -> Any:
+        """Its columns between some rows, shape (columns, rows)."""
+        along = self.shape.index(self.rows)
+        everything = slice(None)
+        part = tuple(rows if axis == along else everything for axis in range(len(self.shape)))
+        values = np.moveaxis(np.asarray(self.load(part)), along, -1)
+        return values.reshape(self.columns, -1)
 
 
 class Contents(NamedTuple):
@@ -73,19 +78,29 @@ class Contents(NamedTuple):
 
 
 class Reader(NamedTuple):
-    """A format: its name, the first bytes of its files, and what opens their content, whose arrays
-    can be loaded until it is closed."""
+    """A format: its name, the first bytes of its files, what opens their content, whose arrays can
+    be loaded until it is closed, and whether parts of them are read without the others."""
 
     kind: str
     start: bytes
-    contents: Callable[[bytes], AbstractContextManager[Contents]]
+    contents: Callable[[IO[bytes]], AbstractContextManager[Contents]]
+    has_parts: bool = False
 
 
 def read_binary(reader: Reader, path: Path, data: bytes) -> Table:
     """Read the arrays of a file as columns of a table."""
+    (table,) = binary_blocks(reader, path, BytesIO(data))
+    return table
+
+
+def binary_blocks(
+    reader: Reader, path: Path, file: IO[bytes], size: int | None = None
+) -> Iterator[Table]:
+    """Read the arrays of a file as tables of some rows, of about a size [bytes]; by default of
+    all."""
     try:
-        with LOCK, reader.contents(data) as found:
-            return _table(reader.kind, path, found)
+        with LOCK, reader.contents(file) as found:
+            yield from _tables(reader.kind, path, found, size)
     except FileError as error:
         raise FileError(f"{path}: {error}") from None
     # Libraries raise errors of any type for a damaged file.
@@ -93,8 +108,8 @@ def read_binary(reader: Reader, path: Path, data: bytes) -> Table:
         raise FileError(f"{path}: a damaged file of {reader.kind}: {error}") from None
 
 
-def _table(kind: str, path: Path, contents: Contents) -> Table:
-    """Arrays of the usual length as the columns of a table; only these are loaded."""
+def _tables(kind: str, path: Path, contents: Contents, size: int | None) -> Iterator[Table]:
+    """Arrays of the usual length as the columns of tables; only these are loaded."""
     found = contents.arrays
     others = [f"{one.name} ({_described(one)})" for one in found if not one.columns]
     tables = [one for one in found if one.columns]
@@ -106,26 +121,29 @@ def _table(kind: str, path: Path, contents: Contents) -> Table:
     length = max(counts, key=lambda size: (counts[size], size))
     others += [f"{one.name} ({one.rows} numbers)" for one in tables if one.rows != length]
     tables = [one for one in tables if one.rows == length]
-    _check_bytes(counts[length] * length * np.dtype(float).itemsize, "its columns")
-    values = np.empty((counts[length], length))
-    columns: list[Found] = []
-    for one in tables:
-        values[len(columns) : len(columns) + one.columns] = one.values()
-        columns += [one if one.columns == 1 else one._replace(name="", long_name="")] * one.columns
-    values[~np.isfinite(values)] = np.nan
+    row = counts[length] * np.dtype(float).itemsize
+    if size is None:
+        _check_bytes(length * row, "its columns")
+    step = length if size is None else max(1, size // row)
+    columns = [
+        one if one.columns == 1 else one._replace(name="", long_name="")
+        for one in tables
+        for _ in range(one.columns)
+    ]
     notes = [f"{kind}: {len(columns)} columns"]
     if others:
         notes.append(f"other arrays, not used: {listed([printable(one) for one in others])}")
-    return Table(
-        path,
-        _headers(columns),
-        tuple(one.unit for one in columns),
-        values,
-        np.arange(1, length + 1),
-        {},
-        False,
-        [*notes, *contents.notes],
-    )
+    headers, units = _headers(columns), tuple(one.unit for one in columns)
+    for start in range(0, length, step):
+        rows = slice(start, min(start + step, length))
+        values = np.empty((len(columns), rows.stop - start))
+        at = 0
+        for one in tables:
+            values[at : at + one.columns] = one.values(rows)
+            at += one.columns
+        values[~np.isfinite(values)] = np.nan
+        lines = np.arange(start + 1, rows.stop + 1)
+        yield Table(path, headers, units, values, lines, {}, False, [*notes, *contents.notes])
 
 
 def _check_bytes(size: int, name: str) -> None:
@@ -161,15 +179,15 @@ def _fields(name: str, shape: Sequence[int], dtype: Any, load: Callable[..., Any
         return [Found(name, tuple(shape), dtype, load)]
     before = f"{name}/" if name else ""
     return [
-        Found(f"{before}{field}", tuple(shape), dtype[field], partial(load, field))
+        Found(f"{before}{field}", tuple(shape), dtype[field], partial(load, field=field))
         for field in dtype.names
     ]
 
 
 @contextmanager
-def _npz(data: bytes) -> Iterator[Contents]:
+def _npz(source: IO[bytes]) -> Iterator[Contents]:
     found: list[Found] = []
-    with zipfile.ZipFile(BytesIO(data)) as archive:
+    with zipfile.ZipFile(source) as archive:
         for member in archive.namelist():
             if member.endswith(".npy"):
                 with archive.open(member) as file:
@@ -180,7 +198,8 @@ def _npz(data: bytes) -> Iterator[Contents]:
 
 
 @contextmanager
-def _npy(data: bytes) -> Iterator[Contents]:
+def _npy(source: IO[bytes]) -> Iterator[Contents]:
+    data = source.read()
     shape, dtype = _npy_header(BytesIO(data))
     load = partial(_npy_array, partial(BytesIO, data))
     yield Contents(_fields("" if dtype.names else "data", shape, dtype, load))
@@ -198,16 +217,21 @@ def _npy_header(file: IO[bytes]) -> tuple[tuple[int, ...], np.dtype[Any]]:
     return shape, dtype
 
 
-def _npy_array(open_file: Callable[[], IO[bytes]], field: str | None = None) -> Any:
+def _npy_array(open_file: Callable[[], IO[bytes]], part: Part, field: str | None = None) -> Any:
     with open_file() as file:
         values = np.lib.format.read_array(file, allow_pickle=False)
-    return values if field is None else values[field]
+    return _field(values, part, field)
+
+
+def _field(values: Any, part: Part, field: str | None = None) -> Any:
+    return (values if field is None else values[field])[part]
 
 
 @contextmanager
-def _matlab(data: bytes) -> Iterator[Contents]:
+def _matlab(source: IO[bytes]) -> Iterator[Contents]:
     from scipy.io import loadmat
 
+    data = source.read()
     _check_unpacked(data)
     contents = loadmat(BytesIO(data), squeeze_me=True, struct_as_record=False)
     found = [
@@ -239,18 +263,18 @@ def _structure(name: str, value: Any, depth: int) -> Iterator[Found]:
     names = getattr(value, "_fieldnames", None)
     if names is None:
         values = np.asarray(value)
-        yield Found(name, values.shape, values.dtype, lambda: values)
+        yield Found(name, values.shape, values.dtype, partial(_field, values))
     elif depth < MAX_DEPTH:
         for one in names:
             yield from _structure(f"{name}/{one}", getattr(value, one), depth + 1)
 
 
 @contextmanager
-def _hdf5(data: bytes) -> Iterator[Contents]:
+def _hdf5(source: IO[bytes]) -> Iterator[Contents]:
     """Data sets of groups, except links, and data in other files."""
     import h5py
 
-    with h5py.File(BytesIO(data), "r") as file:
+    with h5py.File(source, "r") as file:
         if "program_version" in file.attrs and "configuration" in file.attrs:
             raise FileError("is an output of mesoslip, not a file of a measurement")
         found: list[Found] = []
@@ -284,20 +308,20 @@ def _data_set(name: str, one: Any) -> list[Found]:
     if one.shape is None or one.id.get_storage_size() == 0:
         return []
     if one.dtype.names:
-        return _fields(name, one.shape, one.dtype, lambda field: one[field])
+        return _fields(name, one.shape, one.dtype, lambda part, field: one.fields(field)[part])
     attributes = {key: one.attrs[key] for key in one.attrs}
     # A dimension of netCDF without numbers of its own.
     is_number = one.dtype.kind in "fiub"
     if not is_number or b"not a netCDF variable" in bytes(str(attributes.get("NAME", "")), "utf-8"):
         return []
-    return [_packed(name, one.shape, one.dtype, lambda: one[()], attributes)]
+    return [_packed(name, one.shape, one.dtype, one.__getitem__, attributes)]
 
 
 def _packed(
     name: str,
     shape: tuple[int, ...],
     dtype: np.dtype[Any],
-    load: Callable[[], Any],
+    load: Callable[[Part], Any],
     attributes: Mapping[str, Any],
 ) -> Found:
     """An array that is packed, with missing numbers, according to the attributes of CF."""
@@ -308,7 +332,7 @@ def _packed(
         name,
         shape,
         dtype,
-        lambda: _unpacked(load(), attributes),
+        lambda part: _unpacked(load(part), attributes),
         unit.partition(" since ")[0],
         _text(attributes.get("long_name", "")),
     )
@@ -333,16 +357,16 @@ def _text(value: Any) -> str:
 
 
 @contextmanager
-def _netcdf3(data: bytes) -> Iterator[Contents]:
+def _netcdf3(source: IO[bytes]) -> Iterator[Contents]:
     from scipy.io import netcdf_file
 
-    with netcdf_file(BytesIO(data), "r", mmap=False) as file:
+    with netcdf_file(source, "r", mmap=False) as file:
         found = [
             _packed(
                 name,
                 one.data.shape,
                 one.data.dtype,
-                partial(np.array, one.data),
+                partial(_field, one.data),
                 dict(one._attributes),
             )
             for name, one in file.variables.items()
@@ -354,8 +378,8 @@ READERS = (
     Reader("NumPy (.npz)", b"PK\x03\x04", _npz),
     Reader("NumPy (.npy)", b"\x93NUMPY", _npy),
     Reader("MATLAB", b"MATLAB 5.0", _matlab),
-    Reader("MATLAB 7.3 (HDF5)", b"MATLAB 7.3", _hdf5),
-    Reader("HDF5 or netCDF-4", HDF5, _hdf5),
+    Reader("MATLAB 7.3 (HDF5)", b"MATLAB 7.3", _hdf5, True),
+    Reader("HDF5 or netCDF-4", HDF5, _hdf5, True),
     Reader("netCDF-3", b"CDF\x01", _netcdf3),
     Reader("netCDF-3", b"CDF\x02", _netcdf3),
 )

@@ -1,4 +1,4 @@
-"""Long texts block by block, each as a table, in bounded memory."""
+"""Long files block by block, each as a table, in bounded memory."""
 
 from __future__ import annotations
 
@@ -10,13 +10,16 @@ from pathlib import Path
 from typing import IO, Any
 
 from mesoslip.errors import FileError
+from mesoslip.measured.reading.binary import binary_blocks
 from mesoslip.measured.reading.file import READERS, read_file
 from mesoslip.measured.reading.source import COMPRESSIONS, NEWLINE, check_file, text_of
 from mesoslip.measured.reading.table import BadCell, Table
 from mesoslip.measured.reading.text import read_text
 
 # Size of a block [bytes].
-BLOCK = 2**26
+BLOCK = 2**24
+# Bytes by which a format is known.
+HEAD = 16
 # First bytes of files that are read as a whole: of archives, workbooks and UTF-16.
 WHOLE = (b"PK", b"\xff\xfe", b"\xfe\xff", *(one.start for one in READERS))
 
@@ -24,11 +27,17 @@ WHOLE = (b"PK", b"\xff\xfe", b"\xfe\xff", *(one.start for one in READERS))
 def blocks_of(
     path: Path, *, decimal: str | None = None, has_headers: bool = False, sheet: str | None = None
 ) -> Iterator[Table]:
-    """The tables of the blocks of a text; other files are one block. See `read_file`."""
+    """The tables of the blocks of a file; one that is not read in parts is a block. See
+    `read_file`."""
     check_file(path)
     with path.open("rb") as file:
-        head = file.read(8)
+        head = file.read(HEAD)
     name = next((key for key, (start, _) in COMPRESSIONS.items() if head.startswith(start)), "")
+    reader = next((one for one in READERS if one.has_parts and head.startswith(one.start)), None)
+    if sheet is None and reader is not None:
+        with path.open("rb") as file:
+            yield from binary_blocks(reader, path, file, BLOCK)
+        return
     if sheet is not None or head.startswith(WHOLE):
         yield read_file(path, decimal=decimal, has_headers=has_headers, sheet=sheet)
         return

@@ -6,12 +6,11 @@ import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
-from io import BytesIO
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 
-from mesoslip.measured.reading.binary import Contents, Found, Reader
+from mesoslip.measured.reading.binary import Contents, Found, Part, Reader
 from mesoslip.measured.reading.packages import needed
 
 # Properties of a channel that have its unit, in order of preference.
@@ -19,9 +18,9 @@ UNIT_PROPERTIES = ("unit_string", "unit", "Unit", "NI_UnitDescription")
 
 
 @contextmanager
-def _channels(data: bytes) -> Iterator[Contents]:
+def _channels(source: IO[bytes]) -> Iterator[Contents]:
     library = needed("nptdms", "a file of LabVIEW (.tdms)", "npTDMS")
-    with _warnings(library) as warnings, library.TdmsFile.open(BytesIO(data)) as file:
+    with _warnings(library) as warnings, library.TdmsFile.open(source) as file:
         groups = [group for group in file.groups() if group.channels()]
         found: list[Found] = []
         for group in groups:
@@ -68,20 +67,22 @@ def _timed(before: str, channels: list[Any]) -> Iterator[Found]:
             yield Found(name, (len(one),), one.dtype, partial(_numbers, one), unit)
 
 
-def _times(channel: Any) -> Any:
+def _times(channel: Any, part: Part) -> Any:
     """Times of a waveform [s]."""
     start, step = (channel.properties.get(key, 0.0) for key in ("wf_start_offset", "wf_increment"))
-    return start + step * np.arange(len(channel))
+    return start + step * np.arange(*part[0].indices(len(channel)))
 
 
-def _numbers(channel: Any) -> Any:
-    return channel[:]
+def _numbers(channel: Any, part: Part) -> Any:
+    return channel[part[0]]
 
 
-def _seconds(channel: Any) -> Any:
+def _seconds(channel: Any, part: Part) -> Any:
     """Time stamps as seconds from the first one."""
-    stamps = np.asarray(channel[:], dtype="datetime64[ns]")
-    return (stamps - stamps[:1]) / np.timedelta64(1, "s")
+    stamps, first = (
+        np.asarray(channel[one], dtype="datetime64[ns]") for one in (part[0], slice(0, 1))
+    )
+    return (stamps - first) / np.timedelta64(1, "s")
 
 
-READER = Reader("LabVIEW (.tdms)", b"TDSm", _channels)
+READER = Reader("LabVIEW (.tdms)", b"TDSm", _channels, True)

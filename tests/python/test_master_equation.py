@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from conftest import long
 from mesoslip.simulation.realization import Realization
+from mesoslip.simulation.step_errors import step_errors
 from mesoslip.theory.force_curve import ForceCurve
 from oracles import frozen_law, stationary_force
 from states import entries, reals, saved
@@ -559,3 +560,61 @@ def test_the_mass_of_detached_contacts_is_that_of_those_which_broke(klein):
     force = finish(config).trace[750:, 5].mean()
     assert force == pytest.approx(stationary_force(config, 2e-5), rel=1e-3)
     assert force > 1.1 * stationary_force(klein(contacts__drag_rate=0.0, **changes), 2e-5)
+
+
+def slips_of_strong_back_force(klein, resolution, **changes):
+    """A run in which detached contacts attach with a large force, which amplifies every error."""
+    return finish(
+        klein(
+            run__engine="me",
+            run__resolution=resolution,
+            output__interval=1e-4,
+            contacts__back_force_ratio=0.7,
+            contacts__coupling="equal",
+            **changes,
+        )
+    )
+
+
+def test_errors_before_and_after_a_slip_are_stated_and_of_second_order(klein):
+    """With breaks even in time, not with the motion, a slip was 0.2 ms late (stated: 0.01)."""
+    coarse, run, fine = (
+        slips_of_strong_back_force(
+            klein,
+            resolution,
+            run__duration=0.12,
+            drive__velocity=3.88e-6,
+            slider__stiffness=49.4,
+            slider__damping_ratio=0.53,
+            contacts__delay=3.6e-4,
+            **dispersion(0.148, "uniform"),
+        )
+        for resolution in (0.5, 0.25, 0.0625)
+    )
+    stated = step_errors(run.trace, run.slips, coarse.trace, coarse.slips)
+    error = abs(run.slips[0, 1] - fine.slips[0, 1])
+    assert error < 3e-5
+    assert 1 / 3 < stated.slip_time / error < 3
+    time, forces = fine.trace[:, 0], [one.trace[:, 5] for one in (coarse, run, fine)]
+    before, after = time < coarse.slips[0, 1] - 1e-3, time > coarse.slips[0, 1] + 1e-3
+    assert 1 / 3 < stated.force / np.max(np.abs(forces[1] - forces[2])[before]) < 3
+    rms = [np.sqrt(np.mean((one - forces[2])[after] ** 2)) for one in forces[:2]]
+    assert 1.5 < np.log2(rms[0] / rms[1]) < 3
+
+
+def test_steps_longer_than_the_delay_expect_all_that_attaches(klein):
+    """With births in proportion to the length of a shortened step, a slip was 17 us early."""
+    starts = [
+        slips_of_strong_back_force(
+            klein,
+            resolution,
+            run__duration=0.09,
+            drive__velocity=1.1e-6,
+            slider__stiffness=243.0,
+            slider__damping_ratio=0.65,
+            contacts__delay=7e-5,
+            **dispersion(0.058, "uniform"),
+        ).slips[0, 1]
+        for resolution in (0.25, 0.0625)
+    ]
+    assert starts[0] == pytest.approx(starts[1], abs=1e-5)

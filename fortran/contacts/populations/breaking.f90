@@ -24,6 +24,8 @@ module mesoslip_contacts_populations_breaking
    integer, parameter :: block = 8
    !> Negligible gap over the length of a step
    real(wp), parameter :: tiny_gap = 1.0e-6_wp
+   !> The same of contacts that age
+   real(wp), parameter :: near_part = 1.0e-3_wp
 
    !> Trial of a motion to a displacement and time in a direction.
    type :: trial_type
@@ -55,7 +57,7 @@ module mesoslip_contacts_populations_breaking
    contains
       procedure, non_overridable :: try, begin_trial, has_tried, forget_trial, break_tried
       procedure, non_overridable :: tried_mix, keep
-      procedure, non_overridable :: gap_ahead
+      procedure, non_overridable :: gap_ahead, near_gap
       procedure, non_overridable, private :: list_breaking, find_thresholds, find_moments, &
          & find_left_of_table, sum_breaks, more_lost, remove_empty
    end type breaking_populations_type
@@ -185,7 +187,7 @@ contains
 
       associate (trial => self%trial)
          max_breaks = 0.0_wp
-         edge = trial%direction * before%displacement + tiny_gap * self%step
+         edge = trial%direction * before%displacement + self%near_gap()
          breaks = 0.0_wp
          mass = 0.0_wp
          work = 0.0_wp
@@ -342,6 +344,15 @@ contains
 
       gap = merge(self%ahead - displacement, displacement - self%behind, direction > 0.0_wp)
    end function gap_ahead
+
+   !> Distance to the next break up to which a step begins with breaks [m]. Steps that end at the
+   !> next break of contacts which strengthen meanwhile become shorter and shorter.
+   pure function near_gap(self) result(gap)
+      class(breaking_populations_type), intent(in) :: self
+      real(wp) :: gap
+
+      gap = merge(near_part, tiny_gap, self%ages) * self%step
+   end function near_gap
 
    !> Whether the trial is that of a displacement [m] and a time [s], which matters only with
    !> ageing.

@@ -11,7 +11,7 @@ module mesoslip_contacts_populations_offer
       & expected_change
    use mesoslip_contacts_populations_motion, only: distance_in, max_time, patience, time_after, &
       & time_to_move
-   use mesoslip_contacts_populations_packets, only: expected_births_type, shorten_step
+   use mesoslip_contacts_populations_packets, only: expected_births_type
    use mesoslip_contacts_populations_state, only: population_state_type
    use mesoslip_contacts_populations_thermal_step, only: expect_motion, look_ahead_thermal, &
       & max_growth, min_part, smooth_excess
@@ -64,7 +64,8 @@ contains
       if (self%pinned%is_thermal) then
          breaks = self%pinned%count > 0
       else
-         breaks = self%pinned%gap_ahead(pose%displacement, direction) <= slack
+         breaks = self%pinned%gap_ahead(pose%displacement, direction) <= max(slack, &
+            & self%pinned%near_gap())
       end if
       rests = is_in_balance(self, pose, slack)
       breaks = breaks .and. .not. rests
@@ -176,14 +177,15 @@ contains
 
       call try(self, pose, direction, reach, limit)
       if (reach < distance) then
-         call shorten_step(pose, direction, time_to_move(pose, direction, reach), span, distance, &
-            & births)
+         call self%detached%shorten_step(pose, direction, time_to_move(pose, direction, reach), &
+            & max_births, span, distance, births)
       end if
       call find_own()
       if (births%own > 0.0_wp .and. births%number + births%own > max_births) then
          part = max_births / (births%number + births%own)
          births%end_time = min(births%end_time, time_after(pose%time, part * span))
-         call shorten_step(pose, direction, part * span, span, distance, births)
+         call self%detached%shorten_step(pose, direction, part * span, max_births, span, distance, &
+            & births)
          reach = max(distance, min_part * self%pinned%step)
          call try(self, pose, direction, reach, limit)
          call find_own()
@@ -193,10 +195,16 @@ contains
 
       !> Find what breaks and attaches in the step.
       subroutine find_own()
+         real(wp) :: own, growth
+
          births%own = 0.0_wp
-         if (.not. self%detached%own_part(span) > 0.0_wp) return
          if (.not. distance > 0.0_wp) return
-         births%own = self%pinned%trial%breaks * distance / reach * self%detached%own_part(span)
+         growth = 0.5_wp * direction * pose%acceleration * span**2 / distance
+         growth = max(-1.0_wp, min(1.0_wp, growth))
+         own = self%detached%own_part(span, growth)
+         if (.not. own > 0.0_wp) return
+         births%own = self%pinned%trial%breaks * distance / reach * own
+         births%own_place = births%own * self%detached%own_place(span, growth)
          births%own_mass = 0.0_wp
          if (births%own > 0.0_wp) births%own_mass = births%own * self%pinned%trial%mass &
             & / self%pinned%trial%breaks
@@ -253,6 +261,10 @@ contains
             & / 8.0_wp
          if (births%own > 0.0_wp) slope = slope + births%own * parameters%static_force &
             & * self%pinned%newborn_force / distance
+         if (span > 0.0_wp .and. span < max_time .and. .not. self%pinned%is_thermal) then
+            middle = middle + parameters%static_force * self%pinned%newborn_force &
+               & * (0.5_wp * (births%number + births%own) - births%wait / span - births%own_place)
+         end if
          middle = min(middle, max_shift(pose, direction, distance))
          if (span > 0.0_wp .and. span < max_time) then
             velocity = max(0.0_wp, direction * (pose%velocity + span * pose%acceleration))

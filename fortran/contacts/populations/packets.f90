@@ -1,7 +1,9 @@
 !> Detached contacts of infinitely many: packets of them, in the order in which they broke.
 !>
-!> A packet broke within one step, evenly in time, and attaches as evenly, after the delay. With
-!> exponential delays there are no packets: detached contacts attach at a constant rate.
+!> A packet broke within one step, at a rate that is linear in time, and attaches likewise, after
+!> the delay. A constant rate would shorten the delays of breaks that become more frequent, an error
+!> that grows with an instability. With exponential delays there are no packets: detached contacts
+!> attach at a constant rate.
 module mesoslip_contacts_populations_packets
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_numerics_accumulator, only: accumulator_type
@@ -17,11 +19,12 @@ module mesoslip_contacts_populations_packets
    implicit none
    private
 
-   public :: detached_packets_type, expected_births_type, new_detached_packets, shorten_step
+   public :: detached_packets_type, expected_births_type, new_detached_packets
 
-   !> Numbers of a packet: start and end of its breaks [s], number of contacts, and their mass
-   integer, parameter :: packet_length = 4
-   integer, parameter :: row_start = 1, row_end = 2, row_number = 3, row_mass = 4
+   !> Numbers of a packet: start and end of its breaks [s], number of contacts, their mass, and the
+   !> growth of the rate of breaks: half its change in this time, over its mean
+   integer, parameter :: packet_length = 5
+   integer, parameter :: row_start = 1, row_end = 2, row_number = 3, row_mass = 4, row_growth = 5
 
    !> Part of the contacts that is too small for a packet of its own
    real(wp), parameter :: negligible_part = 1.0e-10_wp
@@ -32,10 +35,12 @@ module mesoslip_contacts_populations_packets
 
    !> Contacts expected to attach in a step.
    type :: expected_births_type
-      !> Number of contacts that are detached before the step, and their mass
-      real(wp) :: number = 0.0_wp, mass = 0.0_wp
-      !> Number of contacts that also break in the step, and their mass
-      real(wp) :: own = 0.0_wp, own_mass = 0.0_wp
+      !> Number of contacts that are detached before the step, their mass, and the sum of the times
+      !> until they attach [s]
+      real(wp) :: number = 0.0_wp, mass = 0.0_wp, wait = 0.0_wp
+      !> Number of contacts that also break in the step, their mass, and the sum of the parts of its
+      !> displacement at which they attach
+      real(wp) :: own = 0.0_wp, own_mass = 0.0_wp, own_place = 0.0_wp
       !> Latest end of the step for them [s]
       real(wp) :: end_time = huge(1.0_wp)
    end type expected_births_type
@@ -52,7 +57,7 @@ module mesoslip_contacts_populations_packets
       logical, private :: reattach = .true.
       !> Number of contacts that is too small for a packet of its own
       real(wp), private :: negligible = 0.0_wp
-      !> First and last packet, and attached part of the first
+      !> First and last packet, and how much of the time of the first is over
       integer, private :: first = 1, last = 0
       real(wp), private :: first_part = 0.0_wp
       !> Contacts that are too few for a packet of their own, and join the next
@@ -67,8 +72,8 @@ module mesoslip_contacts_populations_packets
       !> shape (bins, packets)
       real(wp), allocatable, private :: held(:), pending_held(:), fresh_held(:), mix(:, :)
    contains
-      procedure, non_overridable :: add, is_empty, expect, own_part, take_due, set_bins, keep, &
-         & exchange
+      procedure, non_overridable :: add, is_empty, expect, shorten_step, own_part, own_place, &
+         & take_due, set_bins, keep, exchange
       procedure, non_overridable, private :: due_times, continues, make_room, expect_random, &
          & take_random, remove_empty
    end type detached_packets_type
@@ -105,10 +110,11 @@ contains
       end if
    end subroutine set_bins
 
-   !> Add contacts that broke evenly from one time to another [s], and their mass.
-   subroutine add(self, start_time, end_time, number, mass, held, error)
+   !> Add contacts that broke from one time to another [s], their mass, and the growth of their
+   !> rate.
+   subroutine add(self, start_time, end_time, number, mass, growth, held, error)
       class(detached_packets_type), intent(inout) :: self
-      real(wp), intent(in) :: start_time, end_time, number, mass
+      real(wp), intent(in) :: start_time, end_time, number, mass, growth
       !> Under a changing load, their numbers by the heights of sites
       real(wp), intent(in) :: held(:)
       !> Set if there is not enough memory
@@ -129,6 +135,7 @@ contains
          & .and. .not. self%continues(start_time, end_time, number)) then
          self%pending(row_start) = start_time
       end if
+      if (number >= self%pending(row_number)) self%pending(row_growth) = growth
       self%pending(row_end) = end_time
       self%pending(row_number) = self%pending(row_number) + number
       self%pending(row_mass) = self%pending(row_mass) + mass
@@ -215,6 +222,40 @@ contains
       if (index == self%first) early = early + self%first_part * (late - early)
    end subroutine due_times
 
+   !> Part of a packet that attaches until a part of its time.
+   elemental function part_until(time, growth) result(part)
+      real(wp), intent(in) :: time, growth
+      real(wp) :: part
+
+      part = time * (1.0_wp - growth * (1.0_wp - time))
+   end function part_until
+
+   !> Mean of the times at which contacts attach between two parts of the time of their packet.
+   elemental function mean_time(first, last, growth) result(time)
+      real(wp), intent(in) :: first, last, growth
+      real(wp) :: time
+
+      real(wp) :: rate
+
+      time = 0.5_wp * (first + last)
+      rate = 1.0_wp + growth * (2.0_wp * time - 1.0_wp)
+      if (rate > 0.0_wp) time = time + growth * (last - first)**2 / (6.0_wp * rate)
+   end function mean_time
+
+   !> Part of the time of a packet until which a part of its contacts has attached, the inverse of
+   !> part_until.
+   elemental function time_of_part(part, growth) result(time)
+      real(wp), intent(in) :: part, growth
+      real(wp) :: time
+
+      real(wp) :: start_rate
+
+      time = 0.0_wp
+      start_rate = 1.0_wp - growth
+      if (part > 0.0_wp) time = min(1.0_wp, 2.0_wp * part &
+         & / (start_rate + sqrt(max(0.0_wp, start_rate**2 + 4.0_wp * growth * part))))
+   end function time_of_part
+
    !> Contacts that will attach in a step, and how long it may last for that.
    subroutine expect(self, time, duration, max_births, breaks, births)
       class(detached_packets_type), intent(in) :: self
@@ -226,7 +267,7 @@ contains
       logical, intent(in) :: breaks
       type(expected_births_type), intent(out) :: births
 
-      real(wp) :: early, late, until, remaining
+      real(wp) :: early, late, until
       integer :: index
 
       if (self%is_random) then
@@ -242,9 +283,7 @@ contains
             if (births%number > 0.0_wp) births%end_time = until
             return
          end if
-         remaining = self%packet(row_number, index)
-         if (index == self%first) remaining = remaining * (1.0_wp - self%first_part)
-         call add_even(remaining, self%packet(row_mass, index) / self%packet(row_number, index))
+         call add_packet(self%packet(:, index), merge(self%first_part, 0.0_wp, index == self%first))
          if (births%end_time < huge(1.0_wp)) return
          if (late >= time + duration) then
             ! The expectation holds for about the expected duration.
@@ -262,26 +301,30 @@ contains
 
    contains
 
-      !> Add contacts with a mean mass that attach evenly from early to late.
-      subroutine add_even(count, mean_mass)
-         real(wp), intent(in) :: count, mean_mass
+      !> Add the contacts of a packet that attach from a part of its time on.
+      subroutine add_packet(packet, first)
+         real(wp), intent(in) :: packet(:), first
 
-         real(wp) :: more, length
+         real(wp) :: more, last, length, before
 
-         length = late - early
-         more = count
-         if (late > time + duration) then
-            length = max(0.0_wp, time + duration - early)
-            more = count * length / (late - early)
-         end if
-         if (births%number + more > max_births) then
-            if (more > 0.0_wp) length = length * (max_births - births%number) / more
-            more = max_births - births%number
-            births%end_time = max(early + length, nearest(time, 1.0_wp))
-         end if
-         births%number = births%number + more
-         births%mass = births%mass + more * mean_mass
-      end subroutine add_even
+         associate (number => packet(row_number), growth => packet(row_growth))
+            length = packet(row_end) - packet(row_start)
+            before = part_until(first, growth)
+            last = 1.0_wp
+            if (late > time + duration) last = min(1.0_wp, max(first, &
+               & first + (time + duration - early) / length))
+            more = number * max(0.0_wp, part_until(last, growth) - before)
+            if (births%number + more > max_births) then
+               more = max_births - births%number
+               last = max(first, time_of_part(before + more / number, growth))
+               births%end_time = max(early + (last - first) * length, nearest(time, 1.0_wp))
+            end if
+            births%number = births%number + more
+            births%mass = births%mass + more * packet(row_mass) / number
+            births%wait = births%wait + more * (early - time &
+               & + (mean_time(first, last, growth) - first) * length)
+         end associate
+      end subroutine add_packet
 
    end subroutine expect
 
@@ -294,7 +337,7 @@ contains
       !> Under a changing load, their numbers by the heights of sites
       real(wp), intent(inout) :: held(:)
 
-      real(wp) :: early, late, until, part, part_before, more
+      real(wp) :: early, late, part, part_before, more, attached, when_more
 
       births = 0.0_wp
       moment = 0.0_wp
@@ -306,17 +349,21 @@ contains
          if (early > after%time) exit
          part_before = self%first_part
          part = 1.0_wp
-         until = late
          if (late > after%time) then
-            until = after%time
-            part = part_before + (1.0_wp - part_before) * (until - early) / (late - early)
+            part = part_before + (1.0_wp - part_before) * (after%time - early) / (late - early)
          end if
-         more = self%packet(row_number, self%first) * (part - part_before)
-         births = births + more
-         if (allocated(self%mix)) held = held + more * self%mix(:, self%first)
-         moment = moment + more * position_at(before, after, 0.5_wp * (early + until))
-         when = when + more * 0.5_wp * (early + until)
-         call self%mass%add(-self%packet(row_mass, self%first) * (part - part_before))
+         associate (packet => self%packet(:, self%first))
+            attached = part_until(part, packet(row_growth)) &
+               & - part_until(part_before, packet(row_growth))
+            more = packet(row_number) * attached
+            when_more = packet(row_start) + self%delay + (packet(row_end) - packet(row_start)) &
+               & * mean_time(part_before, part, packet(row_growth))
+            births = births + more
+            if (allocated(self%mix)) held = held + more * self%mix(:, self%first)
+            moment = moment + more * position_at(before, after, when_more)
+            when = when + more * when_more
+            call self%mass%add(-packet(row_mass) * attached)
+         end associate
          self%first_part = part
          if (part < 1.0_wp) exit
          self%first_part = 0.0_wp
@@ -330,10 +377,11 @@ contains
       if (allocated(self%held)) self%held = max(0.0_wp, self%held - held)
    end subroutine take_due
 
-   !> Part of the contacts that break evenly in a step of a duration [s] which attaches in it.
-   elemental function own_part(self, duration) result(part)
+   !> Part of the contacts that break in a step of a duration [s] which attaches in it, given the
+   !> growth of their rate.
+   elemental function own_part(self, duration, growth) result(part)
       class(detached_packets_type), intent(in) :: self
-      real(wp), intent(in) :: duration
+      real(wp), intent(in) :: duration, growth
       real(wp) :: part
 
       part = 0.0_wp
@@ -341,9 +389,30 @@ contains
       if (self%is_random) then
          part = own_attached_part(duration / self%delay)
       else if (self%delay < duration) then
-         part = 1.0_wp - self%delay / duration
+         part = part_until(1.0_wp - self%delay / duration, growth)
       end if
    end function own_part
+
+   !> Mean part of the displacement in the step at which these attach. Without growth this is also
+   !> the mean part of its duration.
+   elemental function own_place(self, duration, growth) result(place)
+      class(detached_packets_type), intent(in) :: self
+      real(wp), intent(in) :: duration, growth
+      real(wp) :: place
+
+      real(wp) :: wait, last
+
+      if (self%is_random) then
+         place = mean_own_time(duration / self%delay)
+         return
+      end if
+      ! With a linear velocity contacts break at the part p(t) of the displacement, and attach at
+      ! p(t + wait).
+      wait = min(1.0_wp, self%delay / duration)
+      last = 1.0_wp - wait
+      place = 0.5_wp * part_until(last, growth) + wait * (1.0_wp - growth * last) &
+         & + 2.0_wp * growth * wait * mean_time(0.0_wp, last, growth)
+   end function own_place
 
    !> The same as expect for exponential delays.
    subroutine expect_random(self, time, duration, max_births, breaks, births)
@@ -368,10 +437,12 @@ contains
       births%end_time = time_after(time, patience * length)
       if (part * number > max_births) then
          part = max_births / number
-         births%end_time = time_after(time, -self%delay * log(1.0_wp - part))
+         length = -self%delay * log(1.0_wp - part)
+         births%end_time = time_after(time, length)
       end if
       births%number = part * number
       births%mass = part * self%mass%total()
+      births%wait = births%number * length * mean_attached_time(length / self%delay)
    end subroutine expect_random
 
    !> The same as take_due for exponential delays.
@@ -401,16 +472,22 @@ contains
       self%fresh = 0.0_wp
    end subroutine take_random
 
-   !> Shorten a step of a duration and displacement, and its births, to a time [s].
-   pure subroutine shorten_step(pose, direction, time, span, distance, births)
+   !> Shorten a step in which contacts break to a time [s], and expect its births again.
+   subroutine shorten_step(self, pose, direction, time, max_births, span, distance, births)
+      class(detached_packets_type), intent(in) :: self
       type(pose_type), intent(in) :: pose
-      real(wp), intent(in) :: direction, time
+      !> Direction of the motion, and maximum number of contacts that attach
+      real(wp), intent(in) :: direction, time, max_births
+      !> Duration of the step [s], and displacement in it [m]
       real(wp), intent(inout) :: span, distance
       type(expected_births_type), intent(inout) :: births
 
-      births%number = births%number * time / span
-      births%mass = births%mass * time / span
-      span = time
+      real(wp) :: end_time
+
+      end_time = births%end_time
+      call self%expect(pose%time, time, max_births, .true., births)
+      births%end_time = min(end_time, births%end_time)
+      span = min(time, births%end_time - pose%time)
       distance = distance_in(pose, direction, span)
    end subroutine shorten_step
 
@@ -439,7 +516,8 @@ contains
                share = sum(mix)
                if (share > 0.0_wp) mix = mix / share
                lost_mass = lost_mass + (1.0_wp - share) * packet(row_mass) &
-                  & * (1.0_wp - merge(self%first_part, 0.0_wp, index == self%first))
+                  & * (1.0_wp - part_until(merge(self%first_part, 0.0_wp, index == self%first), &
+                  & packet(row_growth)))
                packet(row_number:row_mass) = share * packet(row_number:row_mass)
             end associate
          end do
@@ -493,7 +571,7 @@ contains
       if (size(pending) == packet_length) self%pending = pending
       call archive%exchange("first", self%first)
       call archive%exchange("last", self%last)
-      call archive%exchange("attached_part", self%first_part)
+      call archive%exchange("first_part", self%first_part)
       call archive%exchange("number", self%number)
       call archive%exchange("mass", self%mass)
       if (allocated(self%held)) then

@@ -62,10 +62,27 @@ contains
       associate (trial => self%pinned%trial)
          self%breaks = self%breaks + trial%breaks
          call self%step_work%add(trial%work)
-         call self%detached%add(before%time, after%time, trial%breaks, trial%mass, held, &
-            & self%failure)
+         call self%detached%add(before%time, after%time, trial%breaks, trial%mass, &
+            & growth_of_breaks(self, before, after), held, self%failure)
       end associate
    end subroutine detach_tried
+
+   !> Half the change of the rate of breaks in a motion over the mean rate, from -1 to 1. Contacts
+   !> that reach their thresholds break as fast as the slider moves; by activation they break evenly
+   !> in time.
+   pure function growth_of_breaks(self, before, after) result(growth)
+      class(population_state_type), intent(in) :: self
+      type(pose_type), intent(in) :: before, after
+      real(wp) :: growth
+
+      growth = 0.0_wp
+      if (self%pinned%is_thermal) return
+      associate (twice_mean => before%velocity + after%velocity)
+         if (self%pinned%trial%direction * twice_mean > 0.0_wp) then
+            growth = max(-1.0_wp, min(1.0_wp, (after%velocity - before%velocity) / twice_mean))
+         end if
+      end associate
+   end function growth_of_breaks
 
    !> Break contacts whose thresholds fell to forces against the direction of motion.
    subroutine break_fallen(self, before, after)

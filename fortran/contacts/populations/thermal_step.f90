@@ -3,8 +3,8 @@
 !> In a step only a small part of the contacts breaks by activation. A slider that hardly oscillates
 !> is expected to creep as in the step before; only the breaks then limit the duration of a step.
 module mesoslip_contacts_populations_thermal_step
-   use mesoslip_contacts_populations_motion, only: time_after, time_to_move
-   use mesoslip_contacts_populations_packets, only: expected_births_type, shorten_step
+   use mesoslip_contacts_populations_motion, only: distance_in, time_after, time_to_move
+   use mesoslip_contacts_populations_packets, only: expected_births_type
    use mesoslip_contacts_populations_state, only: population_state_type
    use mesoslip_interface_law, only: interface_law_type, pose_type
    use mesoslip_numerics_kinds, only: wp
@@ -102,7 +102,7 @@ contains
          end if
          associate (trial => self%pinned%trial)
             heat = trial%breaks - trial%cut_breaks
-            own = self%detached%own_part(span)
+            own = self%detached%own_part(span, 0.0_wp)
             births%own = 0.0_wp
             if (distance > 0.0_wp) births%own = own * trial%cut_breaks * distance / reach
          end associate
@@ -123,8 +123,21 @@ contains
       ! Contacts break and attach by activation evenly in time.
       births%number = births%number + own * heat
       births%mass = births%mass + own * heat
-
    end subroutine look_ahead_thermal
+
+   !> Shorten a step of a duration and displacement to a time [s], and its births in proportion:
+   !> contacts break, and so attach, all the time.
+   pure subroutine shorten_step(pose, direction, time, span, distance, births)
+      type(pose_type), intent(in) :: pose
+      real(wp), intent(in) :: direction, time
+      real(wp), intent(inout) :: span, distance
+      type(expected_births_type), intent(inout) :: births
+
+      births%number = births%number * time / span
+      births%mass = births%mass * time / span
+      span = time
+      distance = distance_in(pose, direction, span)
+   end subroutine shorten_step
 
    !> Let the offered force begin with that at the end of the last step, and reach the contact force
    !> at the end of this one: a jump would shake the slider.

@@ -38,7 +38,7 @@ MIN_FACTOR, MAX_FACTOR = 0.05, 5.0
 # Columns of a population, rows of its moments and of a packet: fortran/contacts/populations.
 ORIGIN, FORCE, WEIGHT = 0, 1, 2
 NUMBER, STIFF = 0, 1
-PACKET_START, PACKET_END, PACKET_NUMBER = 0, 1, 2
+PACKET_START, PACKET_END, PACKET_NUMBER, PACKET_MASS, PACKET_GROWTH = range(5)
 SLIDER, PINNED, DETACHED = "rigid slider", "pinned populations", "detached packets"
 
 
@@ -145,7 +145,8 @@ class Coordinates:
         packets = packets[:, there]
         numbers = packets[PACKET_NUMBER].copy()
         if numbers.size:
-            numbers[0] *= 1 - archive.number(DETACHED, "attached_part")
+            part, growth = archive.number(DETACHED, "first_part"), packets[PACKET_GROWTH, 0]
+            numbers[0] *= 1 - part * (1 - growth * (1 - part))
         middle = 0.5 * (packets[PACKET_START] + packets[PACKET_END])
         delay = self._config.contacts.delay or 1.0
         return (archive.number(SLIDER, "time") - middle) / delay, numbers, there
@@ -164,10 +165,10 @@ class Coordinates:
         if numbers.size:
             packets = archive.matrix(DETACHED, "packet")
             factors = self._detached.factors(since, numbers, parts[3] * self._count)
-            for name, row in (("number", PACKET_NUMBER), ("mass", PACKET_NUMBER + 1)):
+            for name, row in (("number", PACKET_NUMBER), ("mass", PACKET_MASS)):
                 more = float((factors - 1) @ (numbers * packets[row, there] / packets[2, there]))
                 archive.set_number(DETACHED, name, archive.number(DETACHED, name) + more)
-            packets[PACKET_NUMBER:, there] *= factors
+            packets[PACKET_NUMBER : PACKET_MASS + 1, there] *= factors
             archive.set_matrix(DETACHED, "packet", packets)
             detached = archive.number(DETACHED, "number")
         if pinned > 0:

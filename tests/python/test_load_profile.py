@@ -38,6 +38,8 @@ def test_blocks_that_hardly_feel_each_other_are_rigid_sliders_of_their_loads(eng
     tables = row(2, 7.0, **TOP, bar_stiffness=1e-12, damping=0.4)
     tables["run"]["engine"] = engine
     if engine == "me":
+        # Fine steps: those of a row and of a rigid slider are not the same.
+        tables["run"]["resolution"] = 0.0625
         tables["contacts"] |= {
             "renewal": "redraw",
             "threshold": {"law": "gaussian", "relative_width": 0.2},
@@ -61,7 +63,7 @@ def test_blocks_that_hardly_feel_each_other_are_rigid_sliders_of_their_loads(eng
         theirs = one.records("trace")["contact_force"]
         scale = abs(theirs).max()
         assert scale > 0.6 * force
-        error = 1e-9 if engine == "eq" else 2e-3
+        error = 1e-9 if engine == "eq" else 2e-4
         np.testing.assert_allclose(forces[:, block], theirs, atol=error * scale)
     assert both.breaks == pytest.approx(breaks, rel=1e-3)
     if engine == "eq":

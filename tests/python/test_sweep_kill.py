@@ -25,9 +25,12 @@ def test_kills_lose_nothing_and_repeat_nothing(tmp_path):
     """A short version of tests/resume/kill_sweep.py."""
     study = Study(tmp_path, 2, np.random.default_rng(3))
     whole = study.expected()
-    study.attack("killed", whole, 2)
+    # A sweep may be over before it is killed twice.
+    for attempt in range(5):
+        if (kills := study.sweep_kills + study.worker_kills) < 2:
+            study.attack(f"killed{attempt}", whole, 2 - kills)
     assert study.wrong == []
-    assert study.sweep_kills + study.worker_kills > 1
+    assert study.sweep_kills + study.worker_kills == 2
 
 
 # States by a file that a point is computed, which then does not end.

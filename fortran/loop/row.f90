@@ -17,8 +17,8 @@ module mesoslip_loop_row
    !> Displacement that is rounding, over the breaking stretch of a contact, and over that of a
    !> block by its static force under all its springs, if contacts are much softer than these
    real(wp), parameter :: tiny_stretch = 4.0e-15_wp, tiny_bend = 4.0e-13_wp
-   !> Displacement of a block by its neighbours up to which first order is exact to rounding, over
-   !> that
+   !> Maximum displacement of a block by what its neighbours do beyond their published motions, over
+   !> that: what first order leaves out is then at most some ten times it
    real(wp), parameter :: unknown = 3.0e4_wp
 
 contains

@@ -94,6 +94,47 @@ def test_a_run_cut_anywhere_is_the_same(kind, seed, tmp_path):
     assert_same(whole(kind), build_tree(results))
 
 
+@pytest.mark.parametrize(
+    ("ageing", "force_ratio", "advances"),
+    [
+        ({"law": "log", "time": 1e-3, "growth": 0.05}, 0.05, 7),
+        (
+            {"law": "relax", "time": 5e-3, "young_force_ratio": 0.6, "young_relative_width": 0.05},
+            0.1,
+            300,
+        ),
+    ],
+)
+def test_cuts_between_reversals_keep_contacts_that_break_next(klein, ageing, force_ratio, advances):
+    """Thresholds that grew in one stroke bound breaks in the next one of the same direction."""
+    thermal = {"rate": 1e4, "force_ratio": force_ratio}
+    config = klein(
+        contacts__count=300,
+        contacts__delay=3e-4,
+        contacts__coupling="equal",
+        contacts__ageing=ageing,
+        contacts__thermal=thermal,
+        run__duration=0.088,
+        drive={
+            "stage": [
+                {"duration": 0.012, "velocity": 1e-5},
+                {"duration": 0.010, "velocity": -1e-5},
+            ],
+            "repeat": 4,
+        },
+    )
+    whole_run, cut = Realization(config, 0), Realization(config, 0)
+    while not whole_run.finished:
+        whole_run.advance()
+    cut.advance(advances)
+    while not cut.finished:
+        before, cut = cut, Realization(config, 0)
+        cut.restore(before.save(), dict(before.waiting))
+        cut.advance(advances)
+    assert cut.advances == whole_run.advances
+    np.testing.assert_array_equal(cut.trace[:], whole_run.trace[:])
+
+
 @pytest.mark.parametrize("kind", ["rigid, lattice", "layered, bdf", "rigid, three realizations"])
 def test_a_chain_of_ten_resumes(kind, tmp_path):
     config, printed = configuration(kind), []

@@ -311,8 +311,11 @@ contains
             length = packet(row_end) - packet(row_start)
             before = part_until(first, growth)
             last = 1.0_wp
-            if (late > time + duration) last = min(1.0_wp, max(first, &
-               & first + (time + duration - early) / length))
+            if (late > time + duration) then
+               last = first
+               if (time + duration > early) last = min(1.0_wp, first + (time + duration - early) &
+                  & / length)
+            end if
             more = number * max(0.0_wp, part_until(last, growth) - before)
             if (births%number + more > max_births) then
                more = max_births - births%number

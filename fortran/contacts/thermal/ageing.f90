@@ -24,7 +24,8 @@ module mesoslip_contacts_thermal_ageing
    use mesoslip_contacts_individual_record, only: row_limit, row_origin, row_renewal, row_stiffness
    use mesoslip_contacts_thermal_contacts, only: thermal_contacts_type, initialize_thermal, &
       & offer_thermal, respond_thermal
-   use mesoslip_contacts_thermal_keys, only: exchange_thermal, life_clock, life_key, life_left
+   use mesoslip_contacts_thermal_keys, only: exchange_thermal, life_clock, life_key, life_left, &
+      & rebuild_thermal
    use mesoslip_contacts_thermal_steady, only: grown, set_up_steady
    use mesoslip_hazard, only: force_sign, never
    use mesoslip_interface_law, only: interface_law_type, pose_type, window_type
@@ -84,11 +85,11 @@ module mesoslip_contacts_thermal_ageing
    contains
       procedure :: initialize, offer, respond, plan, leave, begin_life, accepts_break, &
          & update_bounds, rebuild, records, exchange, limit_at_birth, shift_order
-      procedure :: find_ahead, bound_ahead, gather_ahead
+      procedure :: find_ahead, bound, gather_ahead
       procedure :: start_steadily, end_steadily, solve_newborn, begin_solved
       procedure, non_overridable, private :: set_bound, threshold, mean_of, draw_attempt, &
          & solve_break, falling_bound, turns_ahead, may_turn_later, is_extrapolated, &
-         & extrapolate, add_leader, drop_leader, break_leaders
+         & extrapolate, add_leader, drop_leader, break_leaders, put_turns_back
    end type thermal_ageing_contacts_type
 
 contains
@@ -147,19 +148,26 @@ contains
       class(thermal_ageing_contacts_type), intent(inout) :: self
       type(pose_type), intent(in) :: before, after
 
-      integer :: turn
-
       if (self%is_steady) then
          self%prediction%jerk_error = 0.0_wp
       else
          call self%prediction%compare(before, after)
       end if
+      call self%put_turns_back()
+      call respond_thermal(self, before, after)
+   end subroutine respond
+
+   !> Put contacts whose forces might change their sign in the motion back into the order ahead.
+   subroutine put_turns_back(self)
+      class(thermal_ageing_contacts_type), intent(inout) :: self
+
+      integer :: turn
+
       do turn = 1, self%turns
          call self%order(self%ahead)%put(self%turning(turn), self%turn_key(turn))
       end do
       self%turns = 0
-      call respond_thermal(self, before, after)
-   end subroutine respond
+   end subroutine put_turns_back
 
    !> The lowest of the leaders' breaks by extrapolation and the bounds of the others. A contact
    !> whose bound comes before becomes a leader, with its present threshold as its bound. A force
@@ -175,6 +183,8 @@ contains
       integer :: number, contact(max_extrapolated)
       logical :: leads
 
+      ! A law may be offered again without a response.
+      call self%put_turns_back()
       call self%prediction%predict(pose, law)
       if (.not. pose%inverse_mass > 0.0_wp) then
          call self%order(self%ahead)%first(ahead)
@@ -351,13 +361,13 @@ contains
       end do
    end subroutine break_leaders
 
-   pure function bound_ahead(self, contact) result(bound)
+   pure function bound(self, contact)
       class(thermal_ageing_contacts_type), intent(in) :: self
       integer, intent(in) :: contact
       real(wp) :: bound
 
       bound = self%age(age_bound, contact)
-   end function bound_ahead
+   end function bound
 
    subroutine gather_ahead(self)
       class(thermal_ageing_contacts_type), intent(inout) :: self
@@ -672,11 +682,17 @@ contains
       class(thermal_ageing_contacts_type), intent(inout) :: self
       real(wp), intent(in) :: displacement
 
-      integer :: contact
+      integer :: contact, place
 
-      self%leaders = 0
       self%turns = 0
-      call self%thermal_contacts_type%rebuild(displacement)
+      call rebuild_thermal(self, displacement)
+      do place = 1, self%leaders
+         associate (leader => self%leader(place))
+            call self%order(self%ahead)%remove(leader)
+            self%leader_key(place) = self%direction * self%record(row_origin, leader) &
+               & + self%age(age_bound, leader)
+         end associate
+      end do
       call self%order_renewal%clear()
       do contact = 1, self%parameters%count
          if (.not. self%record(row_stiffness, contact) > 0.0_wp) cycle
@@ -705,10 +721,16 @@ contains
       class(thermal_ageing_contacts_type), intent(inout) :: self
       type(archive_type), intent(inout) :: archive
 
+      real(wp) :: leader(max_leaders)
+
       call exchange_thermal(self, archive)
       call archive%section("ages of thermal contacts")
       call archive%exchange("age", self%age)
       call self%prediction%exchange(archive)
+      call archive%exchange("leaders", self%leaders)
+      leader = real(self%leader, wp)
+      call archive%exchange_fixed("leader", [max_leaders, 1], leader)
+      self%leader = nint(leader)
    end subroutine exchange
 
    subroutine shift_order(self, shift)

@@ -18,7 +18,7 @@ module mesoslip_contacts_thermal_keys
    implicit none
    private
 
-   public :: thermal_keys_type, set_up_keys, exchange_thermal
+   public :: thermal_keys_type, set_up_keys, exchange_thermal, rebuild_thermal
    public :: life_clock, life_left, life_key, life_next, motions
 
    !> Stretch over the mean breaking stretch at which the sign of a force changes: negligible, but
@@ -55,10 +55,10 @@ module mesoslip_contacts_thermal_keys
       logical :: is_steady = .false.
       real(wp) :: velocity = 0.0_wp
    contains
-      procedure :: rebuild, shift_order, behind_of, exchange => exchange_thermal
+      procedure :: rebuild => rebuild_thermal, shift_order, behind_of, exchange => exchange_thermal
       !> Bound on the breaking stretch of a contact, and contacts put back that are not in the order
       !> ahead
-      procedure :: bound_ahead, gather_ahead
+      procedure :: bound, gather_ahead
       procedure, non_overridable :: put, insert, take_out, change_sign, clear_orders
       procedure, non_overridable :: update_deviate, distance, move_reference, reverse_if_due
       procedure, non_overridable, private :: set_key
@@ -145,12 +145,11 @@ contains
       end if
       number = int(self%life(life_clock, contact))
       call self%order(motions + number)%put(contact, self%life(life_key, contact))
-      associate (origin => self%record(row_origin, contact), &
-         & limit => self%record(row_limit, contact))
+      associate (origin => self%record(row_origin, contact), bound => self%bound(contact))
          call self%order(self%ahead)%put(contact, self%direction * origin &
-            & + self%distance(number, self%bound_ahead(contact), self%direction))
+            & + self%distance(number, bound, self%direction))
          call self%order(3 - self%ahead)%put(contact, -(self%direction * origin &
-            & - self%distance(number, limit, -self%direction)))
+            & - self%distance(number, bound, -self%direction)))
       end associate
       self%members(number) = self%members(number) + 1
    end subroutine insert
@@ -184,15 +183,15 @@ contains
       distance = merge(limit, tiny_stretch * self%stretch, force_sign(number) * direction > 0.0_wp)
    end function distance
 
-   !> Bound on the stretch at which a contact breaks in the motion ahead [m]: its limit, but for
-   !> kinds whose limits are older.
-   pure function bound_ahead(self, contact) result(bound)
+   !> Bound on the stretch at which a contact breaks [m]: its limit, but for kinds whose limits are
+   !> older.
+   pure function bound(self, contact)
       class(thermal_keys_type), intent(in) :: self
       integer, intent(in) :: contact
       real(wp) :: bound
 
       bound = self%record(row_limit, contact)
-   end function bound_ahead
+   end function bound
 
    !> Put contacts that are not in the order ahead back into it: none here.
    subroutine gather_ahead(self)
@@ -207,7 +206,7 @@ contains
       real(wp) :: coordinate
 
       coordinate = self%direction * self%record(row_origin, contact) &
-         & - self%distance(int(self%life(life_clock, contact)), self%record(row_limit, contact), &
+         & - self%distance(int(self%life(life_clock, contact)), self%bound(contact), &
          & -self%direction)
    end function behind_of
 
@@ -313,7 +312,7 @@ contains
       if (self%direction > 0.0_wp) call self%order(2)%rest()
    end subroutine reverse_if_due
 
-   subroutine rebuild(self, displacement)
+   subroutine rebuild_thermal(self, displacement)
       class(thermal_keys_type), intent(inout) :: self
       real(wp), intent(in) :: displacement
 
@@ -323,7 +322,7 @@ contains
       do contact = 1, self%parameters%count
          if (self%record(row_stiffness, contact) > 0.0_wp) call self%insert(contact)
       end do
-   end subroutine rebuild
+   end subroutine rebuild_thermal
 
    !> Clear all orders, for the present direction of motion.
    subroutine clear_orders(self)

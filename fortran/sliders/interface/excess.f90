@@ -2,9 +2,10 @@
 !>
 !> The excess e of its neighbours over their published motions pulls a block by βe + νe', β and ν
 !> being the spring and the damping between neighbours over the mass of a block. It moves by δ more,
-!> δ'' = βe + νe' - Dδ' - Kδ, which integrals of e give to order t⁶. δ is added at the block's next
-!> event and at the end of the step, with the losses along δ, and those of e' along the motion of
-!> the block, integrated by parts. An end of its window the block reaches earlier by δ/v.
+!> δ'' = βe + νe' - Dδ' - Kδ, which integrals of e give to order t⁶ (t⁵ with ν). The memory of a
+!> damper of the setup is left out, below 1e-12 of a breaking stretch. δ is added at the block's
+!> next event and at the end of the step, with the losses along δ, and those of e' along the motion
+!> of the block, integrated by parts. An end of its window the block reaches earlier by δ/v.
 module mesoslip_sliders_interface_excess
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_sliders_interface_polynomials, only: evaluate, max_order, moments
@@ -138,7 +139,8 @@ contains
          time = 0.0_wp
          if (.not. crosses) then
             place = max(window%lower, min(window%upper, place + shift))
-         else if (abs(shift) <= max_part * self%span(block) * abs(speed)) then
+         else if (abs(speed) > 0.0_wp .and. abs(shift) <= max_part * self%span(block) &
+            & * abs(speed)) then
             time = min(-shift / speed, self%length - self%moment(block))
             self%pulled_once = self%pulled_once + self%pull(block) * place * time
             self%pulled_lever = self%pulled_lever + self%pull(block) * place * time &

@@ -188,8 +188,8 @@ contains
       end associate
    end subroutine predict
 
-   !> Shorten a step until what its neighbours do not know of a block moves them by no more than
-   !> rounding.
+   !> Shorten a step until what its neighbours do not know of a block moves them by no more than is
+   !> exact to first order.
    subroutine limit_by_excess(self, block, order, step)
       class(row_state_type), intent(inout) :: self
       integer, intent(in) :: block, order

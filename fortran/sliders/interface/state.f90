@@ -42,7 +42,8 @@ module mesoslip_sliders_interface_state
       integer :: own_order = min_order
    end type block_type
 
-   !> An excess over published motions, and its integrals since the start of the step.
+   !> An excess over published motions, and its integrals since the start of the step or the
+   !> last publication.
    type :: excess_type
       real(wp) :: value = 0.0_wp, once = 0.0_wp, twice = 0.0_wp, thrice = 0.0_wp
    end type excess_type

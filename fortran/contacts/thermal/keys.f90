@@ -312,8 +312,11 @@ contains
       if (self%direction > 0.0_wp) call self%order(2)%rest()
    end subroutine reverse_if_due
 
+   !> Make all orders again from the records. A kind calls this for its own type, not that of its
+   !> parent, whose bounds are others.
    subroutine rebuild_thermal(self, displacement)
       class(thermal_keys_type), intent(inout) :: self
+      !> Displacement of the slider [m]
       real(wp), intent(in) :: displacement
 
       integer :: contact

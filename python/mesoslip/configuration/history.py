@@ -23,7 +23,7 @@ class History(Table):
     lists. Outputs keep the points, not the name of the file."""
 
     what: ClassVar[str]
-    """What it is a history of."""
+    """What has this history, as in messages."""
     quantity: ClassVar[Quantity]
     """The quantity, whose name is its key and its column in the file."""
 

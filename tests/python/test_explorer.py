@@ -1259,9 +1259,19 @@ def test_a_movie_is_made_or_the_key_is_named(monkeypatch):
     assert said[-1] == "the movie: 100 % drawn"
     with pytest.raises(ConfigError, match=r"run.engine.*movie"):
         movie_of(Config.load(KLEIN, (*FAST_MOVIE, "run.engine=me")), Stop(), said.append)
-    stop = Stop()
-    stop.set()
-    assert movie_of(Config.load(KLEIN), stop, said.append) is None
+
+
+def test_a_stop_ends_the_drawing_of_a_movie(monkeypatch):
+    monkeypatch.setattr(chosen_frames, "__defaults__", (10,))
+    stop, said = Stop(), []
+
+    def report(message):
+        said.append(message)
+        if message.endswith(" % drawn"):
+            stop.set()
+
+    assert movie_of(Config.load(KLEIN, FAST_MOVIE), stop, report) is None
+    assert len(said) == 2
 
 
 def test_a_measured_trace_lies_beside_the_model():

@@ -10,7 +10,7 @@ import numpy as np
 
 from mesoslip.configuration.config import Config
 from mesoslip.errors import ConfigError, Problem
-from mesoslip.execution.stop import StopRequest
+from mesoslip.execution.stop import StoppedError, StopRequest
 from mesoslip.explorer.live_run import explored, run_live
 from mesoslip.output.tree import build_tree
 from mesoslip.plots.close_up import largest_slip, slip_window
@@ -40,6 +40,8 @@ def movie_of(config: Config, stop: StopRequest, report: Callable[[str], None]) -
 
     def drawn(part: float) -> None:
         nonlocal last
+        if stop.is_set():
+            raise StoppedError("the movie was stopped")
         tens = REPORTED * int(100 * part / REPORTED)
         if tens > last:
             last = tens
@@ -54,7 +56,10 @@ def movie_of(config: Config, stop: StopRequest, report: Callable[[str], None]) -
             return None
     with TemporaryDirectory() as folder:
         path = Path(folder) / "movie.gif"
-        plot(build_tree(results), path, view=view, progress=drawn)
+        try:
+            plot(build_tree(results), path, view=view, progress=drawn)
+        except StoppedError:
+            return None
         return path.read_bytes()
 
 

@@ -14,7 +14,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from mesoslip.array_types import Array
+
 Samples = NDArray[np.int_]
 
 # Number of turning points below which cycles are found one by one.

@@ -6,12 +6,13 @@ import csv
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip.analysis.avalanche_sizes import PowerLawFit, fit_power_law
+from mesoslip.array_types import Array, Dataset, DataTree
 from mesoslip.configuration.config import Config
 from mesoslip.errors import FileError
 from mesoslip.output.access import config_of, group_of
@@ -22,11 +23,6 @@ from mesoslip.output.targets import written_whole
 from mesoslip.output.variables import FRONTS, Group, Meaning
 from mesoslip.quantities import column, number, with_error
 from mesoslip.simulation.fronts import ARRESTED, ARRESTS, KINDS, PRECURSOR
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-Array = NDArray[np.float64]
 
 NO_FRONTS = 'the output has no fronts: they are recorded with slider.kind = "interface"'
 
@@ -350,7 +346,7 @@ def residual_of(tree: Tree, realization: int | None = None) -> float:
     return float(ratios.mean()) if ratios.size else float("nan")
 
 
-def fronts(output: OutputLike) -> xr.DataTree:
+def fronts(output: OutputLike) -> DataTree:
     """The fronts of detachment of an interface with a length, and the events that they are in.
 
     Ruptures of neighbouring blocks whose slips overlap are one event: a precursor, or whole if it
@@ -385,7 +381,7 @@ def fronts(output: OutputLike) -> xr.DataTree:
     return result
 
 
-def _datasets(found: Fronts) -> Iterator[tuple[str, xr.Dataset]]:
+def _datasets(found: Fronts) -> Iterator[tuple[str, Dataset]]:
     import xarray as xr
 
     for group, meanings, dimension, columns in (
@@ -398,7 +394,7 @@ def _datasets(found: Fronts) -> Iterator[tuple[str, xr.Dataset]]:
         yield group, xr.Dataset(variables)
 
 
-def fronts_from(tree: xr.DataTree) -> Fronts:
+def fronts_from(tree: DataTree) -> Fronts:
     """The fronts that `fronts` returned."""
     columns = [
         {str(name): one.values for name, one in tree[group].data_vars.items()}

@@ -6,13 +6,14 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip.analysis.apparatus import Apparatus, apparatus_of, with_force_unit
 from mesoslip.analysis.stick_phases import stick_phases
+from mesoslip.array_types import Dataset
 from mesoslip.output import table_files
 from mesoslip.output.access import group_of
 from mesoslip.output.arrays import Arrays, Tree
@@ -20,9 +21,6 @@ from mesoslip.output.inputs import OutputLike, as_run
 from mesoslip.output.table_files import PrintedTable
 from mesoslip.quantities import Column as PrintedColumn
 from mesoslip.quantities import column, number
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 # Columns that are not in the group of an output: CF units for a force in newtons, and meaning.
 ADDED = {
@@ -209,20 +207,20 @@ def catalogue_of(tree: Tree, realization: int | None = None) -> Catalogue:
     )
 
 
-def catalogue_from(data: xr.Dataset) -> Catalogue:
+def catalogue_from(data: Dataset) -> Catalogue:
     """The catalogue that `slips` returned."""
     columns = {name: _column(data, name) for name in COLUMNS}
     return Catalogue(columns, columns["force_drop"].unit)
 
 
-def _column(data: xr.Dataset | Arrays, name: str) -> Column:
+def _column(data: Dataset | Arrays, name: str) -> Column:
     attributes = data[name].attrs
     return Column(
         data[name].values, attributes.get("units", "1"), attributes.get("long_name", name)
     )
 
 
-def slips(output: OutputLike) -> xr.Dataset:
+def slips(output: OutputLike) -> Dataset:
     """The catalogue of slips of an output, dimension ``slip``, in SI.
 
     Returns
@@ -258,7 +256,7 @@ def slips(output: OutputLike) -> xr.Dataset:
 
 
 def _stick_columns(
-    tree: Tree, data: xr.Dataset | Arrays, apparatus: Apparatus
+    tree: Tree, data: Dataset | Arrays, apparatus: Apparatus
 ) -> dict[str, NDArray[np.float64]]:
     """The columns `STICK_COLUMNS`, NaN where they are unknown."""
     root = tree.to_dataset()

@@ -10,9 +10,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from mesoslip.array_types import Array
 
 # Samples of a batch in the marginal standard error rule, and maximum length of a transient over
 # that of the series.

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from mesoslip.array_types import DataTree
 from mesoslip.command_line.options import (
     JsonOption,
     QuietOption,
@@ -21,8 +22,6 @@ from mesoslip.command_line.progress import progress_shown, say
 from mesoslip.execution.stop import StoppedError, stopped_by_signals
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from mesoslip.inference.posterior import Row
 
 HEAD = (
@@ -99,7 +98,7 @@ def _fitted(
     workers: int | None,
     *,
     quiet: bool,
-) -> xr.DataTree:
+) -> DataTree:
     """Fit traces, and write the posterior."""
     from mesoslip.execution.store import Store
     from mesoslip.inference.fit_trace import as_plan
@@ -187,7 +186,7 @@ def _print_scores(posteriors: Sequence[Path], *, as_json: bool) -> None:
     print_table(cells)
 
 
-def _print(tree: xr.DataTree, *, as_json: bool) -> None:
+def _print(tree: DataTree, *, as_json: bool) -> None:
     """Print the table of a fit, its notes and its warnings."""
     from mesoslip.inference.posterior import table
 
@@ -217,7 +216,7 @@ def _print(tree: xr.DataTree, *, as_json: bool) -> None:
     _print_remarks(tree)
 
 
-def _remarks(tree: xr.DataTree) -> dict[str, list[str]]:
+def _remarks(tree: DataTree) -> dict[str, list[str]]:
     """Warnings and notes, a sentence each."""
     return {
         name: [one for one in str(tree.attrs[name]).split("\n") if one]
@@ -225,7 +224,7 @@ def _remarks(tree: xr.DataTree) -> dict[str, list[str]]:
     }
 
 
-def _print_remarks(tree: xr.DataTree) -> None:
+def _print_remarks(tree: DataTree) -> None:
     remarks = _remarks(tree)
     for one in remarks["notes"]:
         typer.echo(one)

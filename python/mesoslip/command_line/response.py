@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
+from mesoslip.array_types import DataTree
 from mesoslip.command_line.options import (
     JsonOption,
     QuietOption,
@@ -21,9 +22,6 @@ from mesoslip.command_line.options import (
 from mesoslip.command_line.progress import progress_shown, say
 from mesoslip.errors import ConfigError, FileError, Problem
 from mesoslip.execution.stop import StoppedError, stopped_by_signals
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 
 def response(
@@ -137,7 +135,7 @@ def _check_options(refused: Mapping[str, object], *, posterior: bool) -> None:
         raise ConfigError(problems)
 
 
-def _sampled(outputs: Sequence[Path], path: Path, quiet: bool, **options: Any) -> xr.DataTree:
+def _sampled(outputs: Sequence[Path], path: Path, quiet: bool, **options: Any) -> DataTree:
     """The posterior of an output, also written to a file."""
     from mesoslip.inference.rate_tree import response_posterior
     from mesoslip.output import targets, writing
@@ -157,7 +155,7 @@ def _sampled(outputs: Sequence[Path], path: Path, quiet: bool, **options: Any) -
 
 
 def _print_posterior(
-    tree: xr.DataTree, table: Path | None, as_json: bool, as_latex: bool, as_markdown: bool
+    tree: DataTree, table: Path | None, as_json: bool, as_latex: bool, as_markdown: bool
 ) -> None:
     """Print the table of a posterior, assessments of the laws, and warnings."""
     from mesoslip.inference.rate_tree import rate_table, remarks, rows_of_posterior, write_csv

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, field_validator, model_validator
 
+from mesoslip.array_types import Array
 from mesoslip.configuration.columns import (
     HEADER,
     FoundColumn,
@@ -41,8 +42,6 @@ from mesoslip.configuration.table import (
 )
 from mesoslip.errors import FileError
 from mesoslip.quantities import with_unit
-
-Array = NDArray[np.float64]
 
 # Column of a profile along an interface.
 PROFILE_COLUMN = "normal_force"

@@ -23,7 +23,7 @@ from itertools import combinations_with_replacement
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from mesoslip.array_types import Array
 
 # Maximum deviation of a summary, in spreads of the simulations.
 MAX_SCORE = 6.0

@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip.analysis.sampled_slips import FoundSlips
+from mesoslip.array_types import Array, Dataset, DataTree
 from mesoslip.configuration.units import cf_units
 from mesoslip.inference import apparatus
 from mesoslip.inference.checks import (
@@ -27,11 +28,6 @@ from mesoslip.inference.sampler import r_hat
 from mesoslip.output.provenance import program_attributes
 from mesoslip.output.variables import SLIPS, Group, Meaning
 from mesoslip.quantities import with_unit
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-Array = NDArray[np.float64]
 
 # Numbers of each summary of a trace.
 SUMMARIES = Group(
@@ -86,7 +82,7 @@ def interval_digits(low: float, high: float) -> int:
     return max(MIN_DIGITS, 2 + math.ceil(math.log10(size / (high - low))))
 
 
-def build_tree(fitted: FitResult) -> xr.DataTree:
+def build_tree(fitted: FitResult) -> DataTree:
     """A posterior as a tree.
 
     Groups ``posterior`` (dimensions chain, draw), ``prior``, ``observed_data``,
@@ -101,7 +97,7 @@ def build_tree(fitted: FitResult) -> xr.DataTree:
     values = prior.values(estimate.chains)
     chains = {"chain": np.arange(len(values)), "draw": np.arange(values.shape[1])}
 
-    def group(draws: Array, coordinates: dict[str, NDArray[np.int_]]) -> xr.Dataset:
+    def group(draws: Array, coordinates: dict[str, NDArray[np.int_]]) -> Dataset:
         return xr.Dataset(
             {
                 one.key: (
@@ -165,7 +161,7 @@ def suffix(number: int) -> str:
     return f"_{number + 1}" if number else ""
 
 
-def trace_groups(prediction: Prediction, number: int) -> dict[str, xr.Dataset]:
+def trace_groups(prediction: Prediction, number: int) -> dict[str, Dataset]:
     """Groups of a trace and its predictions, by its number."""
     import xarray as xr
 
@@ -253,7 +249,7 @@ def _notes(fitted: FitResult) -> Iterator[str]:
         yield "the strength is taken to be the same along the track (fit.wander = false)"
 
 
-def _slips(found: Sequence[FoundSlips], start: float) -> xr.Dataset:
+def _slips(found: Sequence[FoundSlips], start: float) -> Dataset:
     import xarray as xr
 
     owner = np.repeat(np.arange(len(found)), [len(one) for one in found])
@@ -271,7 +267,7 @@ def summaries_group(
     predicted: Array,
     scores: Array,
     left_out: NDArray[np.bool_],
-) -> xr.Dataset:
+) -> Dataset:
     """The group `SUMMARIES` of traces and of their predictions.
 
     Predicted summaries have the shape (traces, summaries).
@@ -310,7 +306,7 @@ def summaries_group(
     )
 
 
-def _parameters(fitted: FitResult, needs: dict[str, tuple[str, ...]]) -> xr.Dataset:
+def _parameters(fitted: FitResult, needs: dict[str, tuple[str, ...]]) -> Dataset:
     import xarray as xr
 
     prior, draws = fitted.plan.prior, fitted.estimate.draws
@@ -350,7 +346,7 @@ def _parameters(fitted: FitResult, needs: dict[str, tuple[str, ...]]) -> xr.Data
     )
 
 
-def table(tree: xr.DataTree) -> list[Row]:
+def table(tree: DataTree) -> list[Row]:
     """The table of a fit, a row for each parameter."""
     data = tree["parameters"].to_dataset()
     rows = []

@@ -6,14 +6,14 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mesoslip.analysis.apparatus import with_force_unit
 from mesoslip.analysis.experiment_stages import Experiment
 from mesoslip.analysis.rate_and_state import LAWS, assessment, records_of
+from mesoslip.array_types import Array, Dataset, DataTree
 from mesoslip.configuration import arguments
 from mesoslip.configuration.units import cf_units, from_cf_units
 from mesoslip.errors import ConfigError, FileError, Problem
@@ -27,11 +27,6 @@ from mesoslip.output.inputs import OutputLike, opened_run
 from mesoslip.output.provenance import program_attributes
 from mesoslip.output.table_files import PrintedTable, write_table
 from mesoslip.quantities import column, with_error, with_unit
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-Array = NDArray[np.float64]
 
 # Names of parameters in tables, and their meanings.
 NAMES = {
@@ -82,7 +77,7 @@ def response_posterior(
     free_stiffness: bool = False,
     progress: Callable[[float], None] | None = None,
     stop: StopRequest | None = None,
-) -> xr.DataTree:
+) -> DataTree:
     """The posterior of rate-and-state parameters and of the noise of an output. See
     ``docs/response.md``.
 
@@ -146,7 +141,7 @@ def response_posterior(
 
 def _build_tree(
     found: Sequence[RatePosterior], experiment: Experiment, limitation: str, seed: int
-) -> xr.DataTree:
+) -> DataTree:
     """Posteriors of the laws of one record as a tree."""
     import xarray as xr
 
@@ -233,7 +228,7 @@ def _warnings(one: RatePosterior) -> list[str]:
     return found
 
 
-def _draws(prior: Prior, values: Array, unit: str, attributes: dict[str, str]) -> xr.Dataset:
+def _draws(prior: Prior, values: Array, unit: str, attributes: dict[str, str]) -> Dataset:
     """Draws in SI, of shape (chains, draws, parameters), as variables."""
     import xarray as xr
 
@@ -254,7 +249,7 @@ def _draws(prior: Prior, values: Array, unit: str, attributes: dict[str, str]) -
     )
 
 
-def _parameters(one: RatePosterior, unit: str) -> xr.Dataset:
+def _parameters(one: RatePosterior, unit: str) -> Dataset:
     """The table of a law: its parameters, with a - b after those of the states, and the noise."""
     import xarray as xr
 
@@ -306,13 +301,13 @@ def _parameters(one: RatePosterior, unit: str) -> xr.Dataset:
     )
 
 
-def law_groups(tree: xr.DataTree) -> list[xr.Dataset]:
+def law_groups(tree: DataTree) -> list[Dataset]:
     """The groups ``parameters`` of a posterior, one for each law."""
     count = len(str(tree.attrs["laws"]).split("\n"))
     return [tree[f"parameters{suffix(number)}"].to_dataset() for number in range(count)]
 
 
-def rows_of_posterior(tree: xr.DataTree) -> list[dict[str, Any]]:
+def rows_of_posterior(tree: DataTree) -> list[dict[str, Any]]:
     """The table of a posterior in SI, a row for each parameter of each law."""
     rows = []
     for data in law_groups(tree):
@@ -338,7 +333,7 @@ def rows_of_posterior(tree: xr.DataTree) -> list[dict[str, Any]]:
     return rows
 
 
-def rate_table(tree: xr.DataTree) -> PrintedTable:
+def rate_table(tree: DataTree) -> PrintedTable:
     """The table of a posterior; each line says whether its law describes the record."""
     head = ("law", "parameter", "least squares", "median", "90 % interval", "prior", "verdict")
     rows = tuple(_cells(row) for row in rows_of_posterior(tree))
@@ -368,7 +363,7 @@ def _cells(row: dict[str, Any]) -> tuple[str, ...]:
     )
 
 
-def remarks(tree: xr.DataTree) -> dict[str, list[str]]:
+def remarks(tree: DataTree) -> dict[str, list[str]]:
     """Assessments of the laws, warnings about their draws, and notes, a sentence each."""
     found: dict[str, list[str]] = {"assessments": [], "warnings": []}
     for data in law_groups(tree):
@@ -380,7 +375,7 @@ def remarks(tree: xr.DataTree) -> dict[str, list[str]]:
     return found | {"notes": str(tree.attrs["notes"]).split("\n")}
 
 
-def write_csv(tree: xr.DataTree, path: Path) -> None:
+def write_csv(tree: DataTree, path: Path) -> None:
     """Write the table of a posterior in SI; the unit of a value is in its row.
 
     Raises

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip.analysis.strokes import monotone_pieces
+from mesoslip.array_types import Array
 from mesoslip.configuration.columns import IGNORED
 from mesoslip.configuration.units import NUMBER, number_of, to_si
 from mesoslip.errors import ConfigError, FileError, Problem, shown
@@ -22,7 +23,7 @@ from mesoslip.measured.headers import (
     name_of,
     read_header,
 )
-from mesoslip.measured.reading.table import Array, Table, listed
+from mesoslip.measured.reading.table import Table, listed
 from mesoslip.measured.units import plain, size_of, unit_named
 
 # Examples of headers.

@@ -16,7 +16,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from mesoslip.array_types import Array
+
 Integers = NDArray[np.int64]
 
 # Maximum number of means; half of them are around changes.

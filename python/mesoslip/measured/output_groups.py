@@ -4,23 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from mesoslip.analysis.apparatus import with_force_unit
 from mesoslip.analysis.noise import TraceNoise
 from mesoslip.analysis.sampled_slips import FoundSlips
+from mesoslip.array_types import Dataset
 from mesoslip.measured.load_point import DriveStage
 from mesoslip.output import variables
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 
 def slip_group(
     found: FoundSlips, velocity: float | None, stiffness: float | None, unit: str
-) -> xr.Dataset:
+) -> Dataset:
     """The catalogue of slips, with peak velocities if drive and stiffness are known.
 
     The unit is that of the force, "N" or "1", here and in the other groups.
@@ -42,7 +40,7 @@ def slip_group(
     return _group(variables.MEASURED_SLIPS, columns, "slip", unit)
 
 
-def noise_group(noise: TraceNoise, unit: str) -> xr.Dataset:
+def noise_group(noise: TraceNoise, unit: str) -> Dataset:
     """The noise: scalars, the samples of impulses, and lines of hum."""
     import xarray as xr
 
@@ -60,7 +58,7 @@ def noise_group(noise: TraceNoise, unit: str) -> xr.Dataset:
     )
 
 
-def count_group(found: FoundSlips, unit: str) -> xr.Dataset:
+def count_group(found: FoundSlips, unit: str) -> Dataset:
     """Numbers of slips by minimum fall, with the minimum fall of the catalogue."""
     counts = found.counts
     columns = {
@@ -75,7 +73,7 @@ def count_group(found: FoundSlips, unit: str) -> xr.Dataset:
     return data
 
 
-def stage_group(stages: Sequence[DriveStage]) -> xr.Dataset:
+def stage_group(stages: Sequence[DriveStage]) -> Dataset:
     """The stages of the drive."""
     group = variables.MEASURED_STAGES
     columns = {
@@ -96,7 +94,7 @@ def _group(
     columns: Mapping[str, Any],
     dimension: str | None,
     unit: str,
-) -> xr.Dataset:
+) -> Dataset:
     """A group with the unit of the force in place of newtons."""
     import xarray as xr
 

@@ -11,11 +11,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from mesoslip.array_types import Array
 from mesoslip.errors import FileError
 from mesoslip.measured.reading.table import listed
 from mesoslip.quantities import number, with_unit
 
-Array = NDArray[np.float64]
 Numbers = NDArray[np.int_]
 
 # Minimum interval of a gap, over the usual one around it.

@@ -4,18 +4,12 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mesoslip.array_types import Array, Dataset
 from mesoslip.output.access import group_of
 from mesoslip.output.arrays import Arrays, Tree
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-Array = NDArray[np.float64]
 
 
 def times_of(tree: Tree) -> Array:
@@ -28,7 +22,7 @@ def times_of(tree: Tree) -> Array:
 class Samples:
     """Samples of a realization in order of time [s]; those in a file are read when needed."""
 
-    data: xr.Dataset | Arrays
+    data: Dataset | Arrays
     dimension: str
     times: Array
     start: int = 0

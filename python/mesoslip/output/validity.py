@@ -5,19 +5,17 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mesoslip.array_types import Dataset
 from mesoslip.errors import FileError
 from mesoslip.output import variables
 from mesoslip.output.access import group_of, is_measured
 from mesoslip.output.arrays import Arrays, Tree
 from mesoslip.output.provenance import version
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 # Rows that are read at once.
 MAX_ROWS = 2**20
@@ -150,7 +148,7 @@ def _wrong_rows(tree: Tree) -> list[str]:
     return []
 
 
-def _part(data: xr.Dataset | Arrays, name: str, dimension: str, rows: slice) -> NDArray[Any]:
+def _part(data: Dataset | Arrays, name: str, dimension: str, rows: slice) -> NDArray[Any]:
     """Rows of a variable; all of them are kept for those who need them next."""
     if data.sizes[dimension] <= MAX_ROWS:
         return np.asarray(data[name].values)

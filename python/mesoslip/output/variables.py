@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import DTypeLike
 
+from mesoslip.array_types import Variable
 from mesoslip.simulation import fronts
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 
 @dataclass(frozen=True)
@@ -64,7 +62,7 @@ class Group(dict[str, Meaning]):
         """Some of the variables, in this order."""
         return Group({name: self[name] for name in names})
 
-    def variable(self, name: str, dimensions: Sequence[str], values: Any) -> xr.Variable:
+    def variable(self, name: str, dimensions: Sequence[str], values: Any) -> Variable:
         """A variable of the group with its units and long name."""
         import xarray as xr
 

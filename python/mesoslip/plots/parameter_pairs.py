@@ -2,25 +2,21 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from matplotlib.ticker import MaxNLocator, ScalarFormatter
 
+from mesoslip.array_types import DataArray, DataTree
 from mesoslip.configuration.units import from_cf_units
 from mesoslip.plots.key_names import symbol_or_name
 from mesoslip.plots.printing import UNLETTERED, is_narrow
 from mesoslip.plots.style import BLUE, Canvas
 from mesoslip.quantities import Scale, scale_for
 
-if TYPE_CHECKING:
-    import xarray as xr
-
 # Maximum number of draws of a pair of parameters that are shown.
 MAX_POINTS = 1500
 
 
-def _scale(draws: xr.DataArray) -> Scale:
+def _scale(draws: DataArray) -> Scale:
     """The unit that suits the median of a parameter."""
     return scale_for(float(np.median(np.abs(draws.values))), from_cf_units(draws.attrs["units"]))
 
@@ -30,7 +26,7 @@ def _label(name: str, scale: Scale) -> str:
     return scale.label(symbol_or_name(name))
 
 
-def draw_pairs(figure: Canvas, place: object, tree: xr.DataTree) -> None:
+def draw_pairs(figure: Canvas, place: object, tree: DataTree) -> None:
     """Draw pairs of parameters, and on the diagonal the density of each with that of its prior."""
     group, prior = tree["posterior"].to_dataset(), tree["prior"].to_dataset()
     names = [str(name) for name in group.data_vars]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mesoslip.simulation.kernel import Array
+from mesoslip.array_types import Array
 from mesoslip.simulation.recorded_tables import ENERGY_COLUMNS
 
 if TYPE_CHECKING:

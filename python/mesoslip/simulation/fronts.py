@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from mesoslip.array_types import Array
 
 FRONT_COLUMNS = (
     *("event", "start_time", "end_time", "start_position", "end_position", "length", "speed"),

@@ -9,17 +9,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mesoslip.array_types import Array, Complex
 from mesoslip.configuration.sliders.base import SliderTable
 from mesoslip.theory.critical_spring import balancing_spring, outweighed_from
 from mesoslip.theory.sliders import dynamic_stiffness
-
-Array = NDArray[np.float64]
-Complex = NDArray[np.complexfloating[Any, Any]]
 
 # Points of a path for each turn of the response.
 POINTS_A_TURN = 10

@@ -11,11 +11,12 @@ import abc
 import math
 from collections.abc import Iterator
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mesoslip.array_types import Array, Complex
 from mesoslip.configuration import arguments
 from mesoslip.errors import ConfigError, Problem, RunError
 from mesoslip.quantities import percent, with_unit
@@ -38,8 +39,6 @@ from mesoslip.theory.sliders import dynamic_stiffness, stability_problems
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
 
-Array = NDArray[np.float64]
-Complex = NDArray[np.complexfloating[Any, Any]]
 
 # Maximum change of the argument between two points of the path along which roots are counted, and
 # maximum number of halvings of an interval.

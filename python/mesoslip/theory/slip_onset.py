@@ -12,17 +12,15 @@ from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 from scipy import optimize
 
 from mesoslip import _core
+from mesoslip.array_types import Array
 from mesoslip.errors import ConfigError, Problem, RunError
 from mesoslip.output.inputs import ConfigLike, as_config
 from mesoslip.output.provenance import program_attributes
 from mesoslip.output.variables import ONSET
 from mesoslip.theory.force_curve import ForceCurve
-
-Array = NDArray[np.float64]
 
 # Units and meanings of the summary of the onset.
 SUMMARY = {

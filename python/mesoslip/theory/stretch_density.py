@@ -12,16 +12,14 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import special
 
+from mesoslip.array_types import Array
 from mesoslip.configuration.threshold_law import ThresholdLaw
 from mesoslip.theory.table_lives import TableLives, table_lives
 
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
-
-Array = NDArray[np.float64]
 
 
 def stretch_density(

@@ -13,10 +13,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from mesoslip.array_types import Array
+
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
 
-Array = NDArray[np.float64]
 
 # Numbers of stretches times cells that are averaged at once.
 MAX_TOGETHER = 2_000_000

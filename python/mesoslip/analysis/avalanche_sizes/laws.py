@@ -14,7 +14,8 @@ import numpy as np
 import scipy
 
 from mesoslip.analysis.avalanche_sizes.sums import MIN_RATE, Rule, sum_rule
-from mesoslip.analysis.avalanche_sizes.tally import Array, Tally
+from mesoslip.analysis.avalanche_sizes.tally import Tally
+from mesoslip.array_types import Array
 
 # Minimum exponent: sums of laws that rise more steeply would need more nodes.
 MIN_EXPONENT = -20.0

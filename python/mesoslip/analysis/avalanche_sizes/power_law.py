@@ -19,7 +19,8 @@ from mesoslip.analysis.avalanche_sizes.laws import (
     log_posterior,
     uncut_law,
 )
-from mesoslip.analysis.avalanche_sizes.tally import MIN_DIFFERENT, Array, Tally, tally_of
+from mesoslip.analysis.avalanche_sizes.tally import MIN_DIFFERENT, Tally, tally_of
+from mesoslip.array_types import Array
 from mesoslip.errors import MesoslipError
 
 # Significance below which a cutoff is resolved, and p-value below which a fit is rejected.

@@ -6,12 +6,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mesoslip.array_types import Array
 from mesoslip.errors import FileError
 from mesoslip.output.arrays import Tree
-
-Array = NDArray[np.float64]
 
 CHANNEL = "acoustic_emission"
 # Threshold over the standard deviation of the noise: chance exceeds it once in 10^9 samples.

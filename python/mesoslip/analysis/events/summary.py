@@ -9,18 +9,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mesoslip.analysis.events.channel import CHANNEL, Emissions, emissions_of
 from mesoslip.analysis.events.laws import BValue, Omori, b_value, omori
+from mesoslip.array_types import Array
 from mesoslip.errors import ConfigError, FileError, Problem
 from mesoslip.output.access import group_of
 from mesoslip.output.arrays import Tree
 from mesoslip.output.inputs import OutputLike, opened_run_arrays
 from mesoslip.output.table_files import PrintedTable, write_table
 from mesoslip.quantities import number, with_error
-
-Array = NDArray[np.float64]
 
 # Catalogues, and the column that is the size of an event.
 CATALOGUES = {"slips": "force_drop", "avalanches": "size", "channel": "amplitude"}

@@ -17,9 +17,8 @@ from mesoslip.analysis.noise.levels import (
     noise_level,
 )
 from mesoslip.analysis.noise.parts import parts_of
+from mesoslip.array_types import Array
 from mesoslip.quantities import number, with_unit
-
-Array = NDArray[np.float64]
 
 # Blocks of the trace for the drift, and its minimum size in standard errors.
 DRIFT_BLOCKS = 20

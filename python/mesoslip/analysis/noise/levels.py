@@ -6,9 +6,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from mesoslip.array_types import Array
 
 # Orders of differences for the estimate of the white noise.
 ORDERS = range(1, 8)

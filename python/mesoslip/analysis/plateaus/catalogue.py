@@ -7,7 +7,7 @@ import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,7 @@ from mesoslip.analysis.plateaus.levels import Level, levels_of
 from mesoslip.analysis.printed_columns import printed_columns
 from mesoslip.analysis.steady_force import steady_mean
 from mesoslip.analysis.strokes import output_pieces
+from mesoslip.array_types import Array, Dataset
 from mesoslip.configuration import arguments
 from mesoslip.configuration.units import to_si
 from mesoslip.errors import ConfigError, FileError, Problem
@@ -25,11 +26,6 @@ from mesoslip.output.arrays import Tree
 from mesoslip.output.inputs import OutputLike, opened_run_arrays
 from mesoslip.output.table_files import PrintedTable, write_table
 from mesoslip.output.variables import REALIZATION_INDEX, Estimate, Group, Meaning
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-Array = NDArray[np.float64]
 
 PLATEAUS = Group(
     realization_index=REALIZATION_INDEX,
@@ -306,7 +302,7 @@ def check_signal(key: str, signal: str | None) -> None:
         raise ConfigError([Problem("", key, f"must be one of {', '.join(SIGNALS)}", signal)])
 
 
-def plateaus_from(data: xr.Dataset) -> Plateaus:
+def plateaus_from(data: Dataset) -> Plateaus:
     """The plateaus that `plateaus` returned."""
     columns = {str(name): one.values for name, one in data.data_vars.items()}
     viscosity = data.attrs.get("viscosity")
@@ -316,7 +312,7 @@ def plateaus_from(data: xr.Dataset) -> Plateaus:
 @arguments.checked(viscosity=arguments.number(0, is_open=True))
 def plateaus(
     output: OutputLike, *, signal: str | None = None, viscosity: float | None = None
-) -> xr.Dataset:
+) -> Dataset:
     """Mean friction of each plateau of a record, between steps of speed, load or force.
 
     Parameters

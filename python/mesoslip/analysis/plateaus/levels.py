@@ -13,9 +13,8 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from mesoslip.array_types import Array
 
 # Maximum number of means, and minimum number in a piece.
 MAX_POINTS, MIN_POINTS = 2000, 3

@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip.analysis.rate_and_state.points import Points
-
-Array = NDArray[np.float64]
+from mesoslip.array_types import Array
 
 # Minimum noise of a sample over the range of the force: errors of the motion.
 MIN_NOISE = 1e-6

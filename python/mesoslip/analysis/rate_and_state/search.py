@@ -8,14 +8,12 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mesoslip.analysis.rate_and_state.law import RateAndState
 from mesoslip.analysis.rate_and_state.noise import Noise, estimated_noise, white_noise
 from mesoslip.analysis.rate_and_state.records import Record
+from mesoslip.array_types import Array
 from mesoslip.errors import RunError
-
-Array = NDArray[np.float64]
 
 # Maximum number of evaluations in least squares.
 MAX_EVALUATIONS = 40

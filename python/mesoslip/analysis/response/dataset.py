@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -34,15 +34,13 @@ from mesoslip.analysis.response.load_steps import load_step_rows
 from mesoslip.analysis.response.restarts import restart_rows
 from mesoslip.analysis.response.steady import steady_line, steady_rows
 from mesoslip.analysis.response.steps import step_rows
+from mesoslip.array_types import DataTree
 from mesoslip.configuration import arguments
 from mesoslip.errors import FileError
 from mesoslip.output.arrays import Arrays, Tree, Values, Variable, in_xarray
 from mesoslip.output.inputs import OutputLike, opened_run_arrays, several
 from mesoslip.output.table_files import write_table
 from mesoslip.output.variables import Group
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 
 @arguments.checked(
@@ -56,7 +54,7 @@ def response(
     normal_force: float | None = None,
     fit: bool = True,
     free_stiffness: bool = False,
-) -> xr.DataTree:
+) -> DataTree:
     """Steady forces, velocity steps, holds and rate-and-state parameters of one or more outputs.
     See ``docs/response.md``.
 

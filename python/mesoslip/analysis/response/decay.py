@@ -6,9 +6,8 @@ import math
 import warnings
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from mesoslip.array_types import Array
 
 # Maximum number of points in a fit, of each of the two spacings.
 MAX_POINTS = 2000

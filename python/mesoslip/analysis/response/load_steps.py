@@ -13,11 +13,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mesoslip.analysis.experiment_stages import Array, Experiment, Stage
+from mesoslip.analysis.experiment_stages import Experiment, Stage
 from mesoslip.analysis.response.columns import LOAD_STEPS, empty_row
 from mesoslip.analysis.response.decay import decay
 from mesoslip.analysis.response.scatter import error_of_mean
 from mesoslip.analysis.steady_force import steady_mean
+from mesoslip.array_types import Array
 
 # Minimum change of the load from sample to sample in a step: over the load, and over the median of
 # such changes, which are those of the noise.

@@ -4,12 +4,8 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
 from mesoslip.analysis.steady_force import SteadyMean
-
-Array = NDArray[np.float64]
+from mesoslip.array_types import Array
 
 
 def error_of_mean(values: Array, steady: SteadyMean) -> float:

@@ -5,13 +5,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mesoslip.analysis.alternating_extremes import Samples
 from mesoslip.analysis.sampled_slips.levels import Level
 from mesoslip.analysis.sampled_slips.windows import Windows, lines_through, parabolas_through
-
-Array = NDArray[np.float64]
+from mesoslip.array_types import Array
 
 # Fraction of the depth of a fall at either end that is excluded from its duration.
 MARGIN = 0.1

@@ -8,15 +8,13 @@ from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mesoslip.analysis.alternating_extremes import Samples
 from mesoslip.analysis.noise import TraceNoise, estimate_noise
 from mesoslip.analysis.sampled_slips.choice import SlipCounts, chosen
 from mesoslip.analysis.sampled_slips.ends import ends_of, fall_period, fall_rates
 from mesoslip.analysis.sampled_slips.levels import Level, levels
-
-Array = NDArray[np.float64]
+from mesoslip.array_types import Array
 
 
 @dataclass(frozen=True)

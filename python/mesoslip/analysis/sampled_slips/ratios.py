@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mesoslip.analysis.alternating_extremes import Samples
 from mesoslip.analysis.sampled_slips.windows import Windows
-
-Array = NDArray[np.float64]
+from mesoslip.array_types import Array
 
 # Part below the maximum, over the smaller one of rise and fall, in which durations are compared,
 # and maximum of their ratio.

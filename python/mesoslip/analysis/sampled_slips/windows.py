@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip.analysis.alternating_extremes import Samples
+from mesoslip.array_types import Array
 
-Array = NDArray[np.float64]
 Value = TypeVar("Value", bound=np.generic)
 
 # Number of samples that are evaluated at once.

@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ from mesoslip.analysis.strokes.measure import MIDDLE, Measured, Stroke, measure_
 from mesoslip.analysis.strokes.record import StrokeRecord, record_of
 from mesoslip.analysis.strokes.revolutions import found_period, has_rotation, revolutions_of
 from mesoslip.analysis.strokes.variables import CYCLES, STROKES, unit_of
+from mesoslip.array_types import Dataset, DataTree
 from mesoslip.errors import ConfigError, FileError, Problem
 from mesoslip.output.arrays import Tree
 from mesoslip.output.inputs import OutputLike, opened_run_arrays
@@ -26,11 +27,6 @@ from mesoslip.output.table_files import PrintedTable
 from mesoslip.output.targets import written_whole
 from mesoslip.output.variables import FORCES, Group
 from mesoslip.quantities import with_error, with_unit
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-Array = NDArray[np.float64]
 
 # Printed columns: header, and SI unit.
 STROKE_HEADS = {
@@ -243,7 +239,7 @@ def _columns(
     }
 
 
-def strokes_from(tree: xr.DataTree) -> Strokes:
+def strokes_from(tree: DataTree) -> Strokes:
     """The strokes that `strokes` returned, without means over cycles."""
     columns = {
         group: {str(name): one.values for name, one in tree[group].data_vars.items()}
@@ -256,7 +252,7 @@ def strokes_from(tree: xr.DataTree) -> Strokes:
 
 def strokes(
     output: OutputLike, *, middle: float = MIDDLE, period: float | Literal["auto"] | None = None
-) -> xr.DataTree:
+) -> DataTree:
     """The strokes of a record that goes back and forth, or the revolutions of a disc.
 
     Parts of strokes at either end of the record are left out.
@@ -300,7 +296,7 @@ def strokes(
         raise ConfigError([Problem("", "period", "must be a time above 0", period)])
     with opened_run_arrays(output) as tree:
         found = strokes_of(tree, middle, period=period)
-    groups: dict[str, xr.Dataset] = {}
+    groups: dict[str, Dataset] = {}
     for group, meanings, dimension in (("strokes", STROKES, "stroke"), ("cycles", CYCLES, "cycle")):
         variables = {
             name: meanings.variable(name, (dimension,), values)

@@ -8,13 +8,11 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mesoslip.analysis.steady_force import steady_mean, transient
 from mesoslip.analysis.strokes.measure import NORMAL_95, Measured, Stroke
 from mesoslip.analysis.strokes.record import StrokeRecord
-
-Array = NDArray[np.float64]
+from mesoslip.array_types import Array
 
 # Minimum number of cycles for a drift, and for the length of the running-in.
 MIN_DRIFT, MIN_RUNNING_IN = 4, 10

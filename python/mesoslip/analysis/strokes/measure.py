@@ -14,13 +14,11 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mesoslip.analysis.steady_force import MARGIN, MAX_DISCARDED, steady_mean, transient
 from mesoslip.analysis.strokes.record import StrokeRecord
 from mesoslip.analysis.strokes.segments import Piece
-
-Array = NDArray[np.float64]
+from mesoslip.array_types import Array
 
 # Share of a stroke that is its middle.
 MIDDLE = 0.8

@@ -7,17 +7,15 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mesoslip.analysis.noise import noise_level, without_impulses
 from mesoslip.analysis.strokes.segments import FORCE, POSITIONS, Piece, output_pieces
 from mesoslip.analysis.strokes.sliding import polarity
+from mesoslip.array_types import Array
 from mesoslip.errors import FileError
 from mesoslip.output.access import group_of
 from mesoslip.output.arrays import Tree
 from mesoslip.output.variables import FORCES
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -14,14 +14,12 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mesoslip.analysis.alternating_extremes import Extremes, Samples, extremes_of
 from mesoslip.analysis.noise import noise_level
+from mesoslip.array_types import Array
 from mesoslip.output.arrays import Tree
 from mesoslip.output.variables import FORCES
-
-Array = NDArray[np.float64]
 
 # Motions that are given.
 STROKES, ONE_WAY = "strokes", "one-way"

@@ -22,8 +22,6 @@ from mesoslip.plots.trace_variables import driving_force_of
 from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import number, scale_for
 
-Array = NDArray[np.float64]
-
 # Time before and after the fronts of the event that is drawn, over their duration.
 BEFORE, AFTER = 0.08, 0.6
 # Samples in a window from which the record of the blocks is drawn below the ruptures, and the

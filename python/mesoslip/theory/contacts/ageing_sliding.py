@@ -10,18 +10,16 @@ from __future__ import annotations
 
 import math
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mesoslip.array_types import Array, Complex
 from mesoslip.theory.contacts.ageing_lives import lives, steady_force
 from mesoslip.theory.frequency_paths import AVERAGED_OUT, Parts, Turns
 from mesoslip.theory.linear_stability import LinearStability
 from mesoslip.theory.thresholds import threshold_quadrature
-
-Array = NDArray[np.float64]
-Complex = NDArray[np.complexfloating[Any, Any]]
 
 # Relative change of an age, and change of ln v, for derivatives.
 AGE_STEP, SLOPE_STEP = 1e-6, 1e-3

@@ -12,20 +12,17 @@ from __future__ import annotations
 
 import math
 from functools import cached_property
-from typing import Any, ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mesoslip.array_types import Array, Complex
 from mesoslip.theory.contacts.thermal_lives import ThermalAgeingLives, ThermalLives
 from mesoslip.theory.contacts.thermal_response import MAX_TURN, Motion, ThermalResponse
 from mesoslip.theory.delays import drag_impulse
 from mesoslip.theory.frequency_paths import AVERAGED_OUT, Parts, Turns
 from mesoslip.theory.linear_stability import LinearStability
 from mesoslip.theory.sliders import mode_frequencies
-
-Array = NDArray[np.float64]
-Complex = NDArray[np.complexfloating[Any, Any]]
 
 # Length of the panels over thresholds and ages, over f_T and f_T/(k v), for about six digits.
 COARSENESS = 4.0

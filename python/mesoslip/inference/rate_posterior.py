@@ -105,15 +105,6 @@ def sample_laws(
     Without names of laws these are the laws of one state variable, and those of two whose
     parameters least squares determine, but for those that do not describe a record that others
     describe.
-
-    Raises
-    ------
-    FileError
-        If the record has no noise.
-    RunError
-        If the motion of no law can be integrated, or that of a named law.
-    StoppedError
-        If a stop is requested.
     """
     check_installed()
     if record.noise is not None and record.noise.deviation == 0:

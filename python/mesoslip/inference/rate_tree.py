@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from mesoslip.analysis.apparatus import with_force_unit
 from mesoslip.analysis.experiment_stages import Experiment
 from mesoslip.analysis.rate_and_state import LAWS, assessment, records_of
 from mesoslip.array_types import Array, Dataset, DataTree
@@ -26,6 +25,7 @@ from mesoslip.inference.sampler import r_hat
 from mesoslip.output.inputs import OutputLike, opened_run
 from mesoslip.output.provenance import program_attributes
 from mesoslip.output.table_files import PrintedTable, write_table
+from mesoslip.output.variables import with_force_unit
 from mesoslip.quantities import column, with_error, with_unit
 
 # Names of parameters in tables, and their meanings.
@@ -376,13 +376,7 @@ def remarks(tree: DataTree) -> dict[str, list[str]]:
 
 
 def write_csv(tree: DataTree, path: Path) -> None:
-    """Write the table of a posterior in SI; the unit of a value is in its row.
-
-    Raises
-    ------
-    FileError
-        If it cannot be written.
-    """
+    """Write the table of a posterior in SI; the unit of a value is in its row."""
     rows = rows_of_posterior(tree)
     blank = [{key: None if one != one else one for key, one in row.items()} for row in rows]
     units = {

@@ -50,18 +50,9 @@ class Parts(NamedTuple):
 
 
 class Turns(NamedTuple):
-    """The times with which the response turns.
-
-    Attributes
-    ----------
-    period
-        Mean time from birth to birth [s].
-    until
-        Frequency up to which lives are alike enough for the response to turn with it [1/s];
-        infinite if it is not known.
-    delay
-        Delay of all contacts [s]; 0 where each has its own.
-    """
+    """The times with which the response turns: mean time from birth to birth [s], the frequency up
+    to which lives are alike enough for the response to turn with it [1/s], infinite if it is not
+    known, and the delay of all contacts [s], 0 where each has its own."""
 
     period: float
     until: float

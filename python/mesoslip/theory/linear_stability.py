@@ -63,20 +63,8 @@ NO_AMPLITUDE = "Linear theory gives no amplitude"
 
 
 class LinearStability(abc.ABC):
-    """Steady sliding of a configuration, and the growth of small perturbations of it.
-
-    Parameters
-    ----------
-    config
-        The configuration.
-    velocity
-        Velocity [m/s]; that of the drive by default.
-
-    Raises
-    ------
-    ConfigError
-        If there is no theory for the contacts or the slider, or there is no velocity.
-    """
+    """Steady sliding of a configuration at a velocity [m/s], by default that of the drive, and the
+    growth of small perturbations of it."""
 
     def __init__(self, config: Config, velocity: float | None = None) -> None:
         contacts = config.contacts

@@ -59,17 +59,10 @@ SAMPLES = 200
 
 @dataclass(frozen=True)
 class Onset:
-    """A solution of S46 or S47; arrays over the samples.
+    """A solution of S46 or S47; arrays over the samples of τ, x, x′ and its running mean.
 
-    Attributes
-    ----------
-    time, displacement, velocity, mean_velocity
-        τ, x, x′ and its running mean.
-    force_drop
-        ΔF_d/F_s = D1 τ - x, negative: the change of the spring force.
-    ended
-        Whether the solution reached its end: S46 the end of its expansion, S47 the minimum spring
-        force.
+    The force drop is ΔF_d/F_s = D1 τ - x, negative: the change of the spring force. S46 ends at the
+    end of its expansion, S47 at the minimum spring force.
     """
 
     time: Array

@@ -51,15 +51,7 @@ def hold_force(lives: ThermalLives, time: ArrayLike) -> Array:
 
 
 class Restart(NamedTuple):
-    """Force after a hold, under a prescribed slider.
-
-    Attributes
-    ----------
-    displacement
-        Displacements since the end of the hold [m].
-    force
-        The force there [N].
-    """
+    """Force [N] over the displacement since the end of a hold [m], under a prescribed slider."""
 
     displacement: Array
     force: Array

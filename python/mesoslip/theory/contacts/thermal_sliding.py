@@ -49,17 +49,11 @@ POINTS_A_MODE = 2
 class RateAndStateTheory(NamedTuple):
     """Parameters of rate and state that describe contacts near a velocity.
 
-    Attributes
-    ----------
-    a
-        Direct effect [N]: N f_T times the shares of contacts that are pinned, and of those that
-        break before they reach their thresholds, and the drag of the detached ones. After a step of
-        the velocity by a factor r contacts break at a force that is higher by f_T ln r.
-    b
-        Evolution effect [N]: a - dF/d ln v.
-    slip_distance
-        D_c [m]: displacement over which the force evolves, the area between the evolving force and
-        its new steady value over the evolution of the force, for a small step.
+    The direct effect a [N] is N f_T times the shares of contacts that are pinned, and of those that
+    break before they reach their thresholds, and the drag of the detached ones: after a step of the
+    velocity by a factor r contacts break at a force that is higher by f_T ln r. The evolution
+    effect b [N] is a - dF/d ln v. The slip distance D_c [m] is the area between the evolving force
+    and its new steady value over the evolution of the force, for a small step.
     """
 
     a: float

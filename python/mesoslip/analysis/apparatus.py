@@ -82,12 +82,6 @@ def first_velocity(config: Config) -> float:
     return next((one for one in velocities if one), 0.0)
 
 
-def with_force_unit(units: str, force_unit: str) -> str:
-    """CF units of a force in newtons, or of a friction coefficient if the force unit is "1"."""
-    first, _, others = units.partition(" ")
-    return others or "1" if force_unit == "1" and first == "N" else units
-
-
 def _config(tree: Tree, name: str) -> Config | None:
     """The whole configuration; None for a measured trace with a part of it."""
     try:

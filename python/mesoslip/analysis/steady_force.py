@@ -161,3 +161,13 @@ def _error_of_blocks(steady: Array, block: int) -> float:
     # An incomplete block is discarded at the start, next to the transient.
     means = steady[:, steady.shape[1] - count * block :].reshape(-1, block).mean(axis=1)
     return float(means.std(ddof=1) / math.sqrt(means.size))
+
+
+def error_of_mean(values: Array, steady: SteadyMean) -> float:
+    """Standard error of the mean over realizations; the noise of the force for one realization."""
+    return scatter(values) if values.size > 1 else steady.standard_deviation
+
+
+def scatter(values: Array) -> float:
+    """Standard error of the mean over realizations; NaN for one realization."""
+    return float(values.std(ddof=1) / math.sqrt(values.size)) if values.size > 1 else math.nan

@@ -41,8 +41,7 @@ def slips(
     from mesoslip.analysis import slips as catalogues
     from mesoslip.output import files, targets
 
-    if table is not None:
-        targets.check_writable(table, [output])
+    targets.check_writable(table, [output])
     with files.opened_arrays(output) as tree:
         catalogue, counts = catalogues.catalogue_of(tree), catalogues.counts(tree)
     for_print = catalogue.printed()
@@ -113,8 +112,7 @@ def avalanches(
     from mesoslip.analysis.avalanche_sizes import ccdf, logarithmic_bins
     from mesoslip.output import files, targets
 
-    if table is not None:
-        targets.check_writable(table, [output])
+    targets.check_writable(table, [output])
     tree = files.read_run(output)
     start = time_of(after, "--after")
     data = avalanche_catalogue.avalanches(tree, after=start, min_force_ratio=min_force_ratio)

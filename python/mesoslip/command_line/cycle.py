@@ -71,8 +71,7 @@ def cycle(
     from mesoslip.output import targets, writing
 
     checked = load(config, changes)
-    if output is not None:
-        targets.check_output(output, [config, *([] if start is None else [start])])
+    targets.check_output(output, [config, *([] if start is None else [start])])
     print_caveat(checked)
     if continued is not None:
         _follow(checked, continued, start, output, as_json=as_json, quiet=quiet)

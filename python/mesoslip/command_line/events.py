@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Annotated
 
 import typer
@@ -11,9 +12,7 @@ from mesoslip.command_line.options import (
     LatexOption,
     OutputArgument,
     TableOption,
-    print_json,
-    print_tables,
-    write_table,
+    show_catalogue,
 )
 
 
@@ -54,27 +53,14 @@ def events(
     Acoustic emission is compared with the slips of a trace.
     """
     from mesoslip.analysis import events as analysis
-    from mesoslip.output import files, targets
-    from mesoslip.output.table_files import latex
 
     analysis.check_catalogue("--of", catalogue)
-    if table is not None:
-        targets.check_writable(table, [output])
-    with files.opened_arrays(output) as tree:
-        found = analysis.events_of(
-            tree,
-            catalogue,
-            threshold=threshold,
-            completeness=completeness,
-            main_size=main_size,
-            name=str(output),
-        )
-    write_table(table, lambda: found.tables, found.write_csv)
-    if as_json:
-        print_json(found.to_json())
-    elif as_latex:
-        typer.echo(latex(found.tables[0]))
-    else:
-        for note in found.notes:
-            typer.echo(note)
-        print_tables(found.tables)
+    find = partial(
+        analysis.events_of,
+        catalogue=catalogue,
+        threshold=threshold,
+        completeness=completeness,
+        main_size=main_size,
+        name=str(output),
+    )
+    show_catalogue(output, find, table, as_json=as_json, as_latex=as_latex)

@@ -13,13 +13,12 @@ from mesoslip.command_line.options import (
     JsonOption,
     QuietOption,
     SetOption,
+    interruptible,
     output_option,
     print_json,
     print_table,
     workers_option,
 )
-from mesoslip.command_line.progress import progress_shown, say
-from mesoslip.execution.stop import StoppedError, stopped_by_signals
 
 if TYPE_CHECKING:
     from mesoslip.inference.posterior import Row
@@ -109,15 +108,8 @@ def _fitted(
     store = path.with_name(f"{path.stem}.simulations")
     trees = [files.read_run(one) for one in traces]
     plan = as_plan(config, trees, changes)
-    with stopped_by_signals() as stop:
-        try:
-            with progress_shown(quiet) as progress:
-                tree = fit_traces(
-                    traces, plan, store=store, executor=workers, progress=progress, stop=stop
-                )
-        except StoppedError:
-            say(f"{path}: interrupted; the same command continues from {store}")
-            raise typer.Exit(stop.exit_status) from None
+    with interruptible(path, quiet, f"; the same command continues from {store}") as work:
+        tree = fit_traces(traces, plan, store=store, executor=workers, **work._asdict())
     writing.write(tree, path)
     Store(store, "simulations").remove()
     return tree
@@ -138,20 +130,9 @@ def _predict(
     from mesoslip.output import targets, writing
 
     targets.check_output(path, [posterior, trace])
-    with stopped_by_signals() as stop:
-        try:
-            with progress_shown(quiet) as progress:
-                tree = predict(
-                    posterior,
-                    trace,
-                    **({} if predictions is None else {"predictions": predictions}),
-                    executor=workers,
-                    progress=progress,
-                    stop=stop,
-                )
-        except StoppedError:
-            say(f"{path}: interrupted")
-            raise typer.Exit(stop.exit_status) from None
+    count: dict[str, Any] = {} if predictions is None else {"predictions": predictions}
+    with interruptible(path, quiet) as work:
+        tree = predict(posterior, trace, **count, executor=workers, **work._asdict())
     writing.write(tree, path)
     probability = tree.attrs["agreement_probability"]
     if as_json:

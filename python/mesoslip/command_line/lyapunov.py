@@ -42,8 +42,7 @@ def lyapunov(
     from mesoslip.output import targets, writing
 
     checked = load(config, changes)
-    if output is not None:
-        targets.check_output(output, [config])
+    targets.check_output(output, [config])
     duration = quantity_or_none(follow, "--follow", "s", "2 s", positive=True)
     with progress_shown(quiet) as progress:
         tree = lyapunov(

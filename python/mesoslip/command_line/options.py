@@ -4,16 +4,43 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, Protocol, TypeVar
 
 import typer
 
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
     from mesoslip.execution.executors import ExecutorLike
+    from mesoslip.execution.stop import Stop
+    from mesoslip.output.arrays import Tree
     from mesoslip.output.table_files import PrintedTable
+
+
+class Catalogue(Protocol):
+    """What is found in an output: tables for print, and notes on them."""
+
+    @property
+    def tables(self) -> Sequence[PrintedTable]: ...
+
+    @property
+    def notes(self) -> Sequence[str]: ...
+
+    def write_csv(self, path: Path) -> None: ...
+
+    def to_json(self) -> dict[str, Any]: ...
+
+
+Found = TypeVar("Found", bound=Catalogue)
+
+
+class Work(NamedTuple):
+    """Work that reports its progress, and that a signal stops."""
+
+    progress: Callable[[float], None]
+    stop: Stop
 
 
 def output_option(help_text: str, metavar: str = "OUT.nc") -> typer.models.OptionInfo:
@@ -171,6 +198,51 @@ def write_table(
         write_printed(printed(), file)
     elif file is not None:
         write_csv(file)
+
+
+def show_catalogue(
+    output: Path,
+    find: Callable[[Tree], Found],
+    table: Path | None,
+    *,
+    as_json: bool,
+    as_latex: bool,
+    latex_table: int = 0,
+) -> Found:
+    """Print what is found in an output, and write it to the file of a `TableOption`."""
+    from mesoslip.output import files, targets
+    from mesoslip.output.table_files import latex
+
+    targets.check_writable(table, [output])
+    with files.opened_arrays(output) as tree:
+        found = find(tree)
+    write_table(table, lambda: found.tables, found.write_csv)
+    if as_json:
+        print_json(found.to_json())
+    elif as_latex:
+        typer.echo(latex(found.tables[latex_table]))
+    else:
+        for note in found.notes:
+            typer.echo(note)
+        print_tables(found.tables)
+    return found
+
+
+@contextmanager
+def interruptible(
+    path: Path, quiet: bool, hint: str = "", what: str = "simulating"
+) -> Iterator[Work]:
+    """Work on a file that a signal stops, with a message and the exit status of the signal."""
+    from mesoslip.command_line.progress import progress_shown, say
+    from mesoslip.execution.stop import StoppedError, stopped_by_signals
+
+    with stopped_by_signals() as stop:
+        try:
+            with progress_shown(quiet, what) as progress:
+                yield Work(progress, stop)
+        except StoppedError:
+            say(f"{path}: interrupted{hint}")
+            raise typer.Exit(stop.exit_status) from None
 
 
 def counted(count: float, noun: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Annotated
 
 import typer
@@ -11,10 +12,8 @@ from mesoslip.command_line.options import (
     LatexOption,
     OutputArgument,
     TableOption,
-    print_json,
-    print_tables,
     quantity_or_none,
-    write_table,
+    show_catalogue,
 )
 
 
@@ -44,21 +43,8 @@ def plateaus(
     Plateaus lie between steps of speed, load or force.
     """
     from mesoslip.analysis import plateaus as analysis
-    from mesoslip.output import files, targets
-    from mesoslip.output.table_files import latex
 
     analysis.check_signal("--signal", signal)
     lubricant = quantity_or_none(viscosity, "--viscosity", "Pa*s", "90 mPa*s", positive=True)
-    if table is not None:
-        targets.check_writable(table, [output])
-    with files.opened_arrays(output) as tree:
-        found = analysis.plateaus_of(tree, signal=signal, viscosity=lubricant, name=str(output))
-    write_table(table, lambda: found.tables, found.write_csv)
-    if as_json:
-        print_json(found.to_json())
-    elif as_latex:
-        typer.echo(latex(found.tables[0]))
-    else:
-        for note in found.notes:
-            typer.echo(note)
-        print_tables(found.tables)
+    find = partial(analysis.plateaus_of, signal=signal, viscosity=lubricant, name=str(output))
+    show_catalogue(output, find, table, as_json=as_json, as_latex=as_latex)

@@ -13,15 +13,14 @@ from mesoslip.command_line.options import (
     JsonOption,
     QuietOption,
     TableOption,
+    interruptible,
     output_option,
     print_json,
     print_table,
     quantity_or_none,
     write_table,
 )
-from mesoslip.command_line.progress import progress_shown, say
 from mesoslip.errors import ConfigError, FileError, Problem
-from mesoslip.execution.stop import StoppedError, stopped_by_signals
 
 
 def response(
@@ -91,8 +90,7 @@ def response(
     from mesoslip.output.table_files import latex, markdown
 
     scale = quantity_or_none(normal_force, "--normal-force", "N", "10 mN", positive=True)
-    if table is not None:
-        targets.check_writable(table, outputs)
+    targets.check_writable(table, outputs)
     own = {"--output": output, "--law": law, "--samples": samples, "--seed": seed}
     others = {"--normal-force": normal_force, "--no-fit": None if fit else True}
     _check_options(others if posterior else own, posterior=posterior)
@@ -143,13 +141,8 @@ def _sampled(outputs: Sequence[Path], path: Path, quiet: bool, **options: Any) -
     if len(outputs) > 1:
         raise FileError("--posterior is for one output at a time")
     targets.check_output(path, outputs)
-    with stopped_by_signals() as stop:
-        try:
-            with progress_shown(quiet, "sampling") as progress:
-                tree = response_posterior(outputs[0], progress=progress, stop=stop, **options)
-        except StoppedError:
-            say(f"{path}: interrupted")
-            raise typer.Exit(stop.exit_status) from None
+    with interruptible(path, quiet, what="sampling") as work:
+        tree = response_posterior(outputs[0], **work._asdict(), **options)
     writing.write(tree, path)
     return tree
 

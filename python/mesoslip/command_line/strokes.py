@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Annotated, Literal
 
 import typer
@@ -10,11 +11,9 @@ from mesoslip.command_line.options import (
     JsonOption,
     OutputArgument,
     TableOption,
-    print_json,
-    print_tables,
     quantity_or_none,
     share,
-    write_table,
+    show_catalogue,
 )
 
 
@@ -44,24 +43,10 @@ def strokes(
     The record goes back and forth, or is that of a disc.
     """
     from mesoslip.analysis import strokes as analysis
-    from mesoslip.output import files, targets
-    from mesoslip.output.table_files import latex
 
     part = share(middle, "--middle")
     time: float | Literal["auto"] | None = "auto"
     if period != "auto":
         time = quantity_or_none(period, "--period", "s", "0.92 s", positive=True)
-    if table is not None:
-        targets.check_writable(table, [output])
-    with files.opened_arrays(output) as tree:
-        found = analysis.strokes_of(tree, part, str(output), period=time)
-    write_table(table, lambda: found.tables, found.write_csv)
-    if as_json:
-        print_json(found.to_json())
-        return
-    if as_latex:
-        typer.echo(latex(found.tables[-1]))
-        return
-    for note in found.notes:
-        typer.echo(note)
-    print_tables(found.tables)
+    find = partial(analysis.strokes_of, middle=part, name=str(output), period=time)
+    show_catalogue(output, find, table, as_json=as_json, as_latex=as_latex, latex_table=-1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -9,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike
 
-from mesoslip.array_types import Variable
+from mesoslip.array_types import Dataset, Variable
 from mesoslip.simulation import fronts
 
 
@@ -67,6 +68,47 @@ class Group(dict[str, Meaning]):
         import xarray as xr
 
         return xr.Variable(dimensions, values, self[name].attributes)
+
+    def dataset(
+        self,
+        dimensions: Sequence[str],
+        columns: Mapping[str, Any],
+        force_unit: str = "N",
+        attrs: Mapping[str, Any] | None = None,
+    ) -> Dataset:
+        """Variables of the group along the same dimensions."""
+        import xarray as xr
+
+        data = {name: self.variable(name, dimensions, one) for name, one in columns.items()}
+        for name, unit in self.units(force_unit).items():
+            if name in data:
+                data[name].attrs["units"] = unit
+        return xr.Dataset(data, attrs=attrs)
+
+    def units(self, force_unit: str = "N") -> dict[str, str]:
+        """CF units of the variables; see `with_force_unit`."""
+        return {name: with_force_unit(one.units, force_unit) for name, one in self.items()}
+
+    @property
+    def empty_row(self) -> dict[str, Any]:
+        """A row without values."""
+        return {
+            name: math.nan if one.dtype is np.float64 else "" if one.dtype is np.str_ else 0
+            for name, one in self.items()
+        }
+
+
+def with_force_unit(unit: str, force_unit: str) -> str:
+    """A unit with that of a force in newtons, in CF or for print; of friction coefficients if the
+    force unit is "1"."""
+    if force_unit != "1":
+        return unit
+    if unit == "J":
+        return "m"
+    first, _, others = unit.partition(" ")
+    if first == "N":
+        return others or "1"
+    return f"1/{unit[2:]}" if unit.startswith("N/") else unit
 
 
 # Rows of a catalogue have the index of their realization, as in CF's indexed ragged arrays.

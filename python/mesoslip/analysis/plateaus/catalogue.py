@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mesoslip.analysis.apparatus import apparatus_of, with_force_unit
+from mesoslip.analysis.apparatus import apparatus_of
 from mesoslip.analysis.plateaus.levels import Level, levels_of
 from mesoslip.analysis.printed_columns import printed_columns
 from mesoslip.analysis.steady_force import steady_mean
@@ -24,7 +24,7 @@ from mesoslip.errors import ConfigError, FileError, Problem
 from mesoslip.output.access import group_of
 from mesoslip.output.arrays import Tree
 from mesoslip.output.inputs import OutputLike, opened_run_arrays
-from mesoslip.output.table_files import PrintedTable, write_table
+from mesoslip.output.table_files import PrintedTable, rows_of, write_table
 from mesoslip.output.variables import REALIZATION_INDEX, Estimate, Group, Meaning
 
 PLATEAUS = Group(
@@ -81,14 +81,7 @@ class Plateaus:
     @property
     def rows(self) -> list[dict[str, Any]]:
         """A dictionary for each plateau; None for unknown values."""
-        lists = [column.tolist() for column in self.columns.values()]
-        return [
-            {
-                name: None if value != value else value
-                for name, value in zip(self.columns, row, strict=True)
-            }
-            for row in zip(*lists, strict=True)
-        ]
+        return rows_of(self.columns)
 
     @property
     def notes(self) -> list[str]:
@@ -105,17 +98,11 @@ class Plateaus:
     @property
     def tables(self) -> list[PrintedTable]:
         """The plateaus for print."""
-        unit = self.force_unit
-        return [
-            printed_columns("Plateaus", self.columns, HEADS, lambda si: with_force_unit(si, unit))
-        ]
+        return [printed_columns("Plateaus", self.columns, HEADS, self.force_unit)]
 
     def write_csv(self, path: Path) -> None:
         """Write the plateaus as a table in SI."""
-        units = {
-            name: with_force_unit(one.units, self.force_unit) for name, one in PLATEAUS.items()
-        }
-        write_table(self.rows, units, path)
+        write_table(self.rows, PLATEAUS.units(self.force_unit), path)
 
     def to_json(self) -> dict[str, Any]:
         """Everything as nested lists and numbers."""
@@ -341,16 +328,9 @@ def plateaus(
     ConfigError
         If the signal is another one, or the viscosity not above 0.
     """
-    import xarray as xr
-
     check_signal("signal", signal)
     with opened_run_arrays(output) as tree:
         found = plateaus_of(tree, signal=signal, viscosity=viscosity)
-    variables = {
-        name: PLATEAUS.variable(name, ("plateau",), values)
-        for name, values in found.columns.items()
-    }
-    for one in variables.values():
-        one.attrs["units"] = with_force_unit(one.attrs["units"], found.force_unit)
     known = {} if found.viscosity is None else {"viscosity": found.viscosity}
-    return xr.Dataset(variables, attrs={"source": found.source} | known)
+    attributes = {"source": found.source} | known
+    return PLATEAUS.dataset(("plateau",), found.columns, found.force_unit, attributes)

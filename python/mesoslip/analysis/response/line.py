@@ -12,15 +12,10 @@ from mesoslip.array_types import Array
 
 @dataclass(frozen=True)
 class Line:
-    """A straight line by weighted least squares.
+    """A straight line by weighted least squares: slope, its standard error, and value at 0.
 
-    Attributes
-    ----------
-    slope, slope_error, level
-        Slope, its standard error, and value at 0. The error is multiplied by √(χ²/degrees of
-        freedom) if that is more than 1; that of two points follows from their errors.
-    chi_square, degrees_of_freedom
-        χ² with the errors of the points; NaN for points without errors.
+    The error is multiplied by √(χ²/degrees of freedom) if that is more than 1; that of two points
+    follows from their errors. χ² is NaN for points without errors.
     """
 
     slope: float

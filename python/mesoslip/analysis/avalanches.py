@@ -8,12 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mesoslip.analysis.avalanche_sizes import (
-    REJECTED,
-    compare_laws,
-    fit_power_law,
-    local_exponents,
-)
+from mesoslip.analysis.avalanche_sizes import REJECTED, compare_laws, fit_power_law, local_exponents
 from mesoslip.array_types import Dataset, DataTree
 from mesoslip.configuration import arguments
 from mesoslip.configuration.config import Config

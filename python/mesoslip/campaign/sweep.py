@@ -9,14 +9,7 @@ from typing import Any
 
 from mesoslip.array_types import Dataset
 from mesoslip.campaign.combination import Combination, described
-from mesoslip.campaign.point import (
-    FORMAT,
-    Outcome,
-    Task,
-    chain_keys,
-    compute,
-    point_name,
-)
+from mesoslip.campaign.point import FORMAT, Outcome, Task, chain_keys, compute, point_name
 from mesoslip.campaign.sweep_dataset import SweepDataset
 from mesoslip.campaign.sweep_plan import Plan, as_plan
 from mesoslip.configuration import arguments

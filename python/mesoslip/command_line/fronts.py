@@ -7,12 +7,7 @@ from typing import Annotated
 
 import typer
 
-from mesoslip.command_line.options import (
-    JsonOption,
-    OutputArgument,
-    TableOption,
-    show_catalogue,
-)
+from mesoslip.command_line.options import JsonOption, OutputArgument, TableOption, show_catalogue
 
 
 def fronts(

@@ -18,13 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, field_validator, model_validator
 
 from mesoslip.array_types import Array
-from mesoslip.configuration.columns import (
-    HEADER,
-    FoundColumn,
-    Quantity,
-    cells_of,
-    values_of,
-)
+from mesoslip.configuration.columns import HEADER, FoundColumn, Quantity, cells_of, values_of
 from mesoslip.configuration.history import MAX_PARTS, History
 from mesoslip.configuration.kernel_parameters import Parameters
 from mesoslip.configuration.reading import text_of

@@ -14,13 +14,7 @@ from mesoslip.analysis.sampled_slips import FoundSlips
 from mesoslip.array_types import Array, Dataset, DataTree
 from mesoslip.configuration.units import cf_units
 from mesoslip.inference import apparatus
-from mesoslip.inference.checks import (
-    DETERMINED,
-    UNDETERMINED,
-    needed_groups,
-    shrinkage,
-    warnings,
-)
+from mesoslip.inference.checks import DETERMINED, UNDETERMINED, needed_groups, shrinkage, warnings
 from mesoslip.inference.features import Feature
 from mesoslip.inference.fit import FitResult, Prediction
 from mesoslip.inference.prior import WANDER

@@ -15,14 +15,7 @@ from mesoslip.configuration.columns import IGNORED
 from mesoslip.configuration.units import NUMBER, number_of, to_si
 from mesoslip.errors import ConfigError, FileError, Problem, shown
 from mesoslip.measured.description import Column, Columns
-from mesoslip.measured.headers import (
-    EITHER,
-    QUANTITIES,
-    Heading,
-    bare_name,
-    name_of,
-    read_header,
-)
+from mesoslip.measured.headers import EITHER, QUANTITIES, Heading, bare_name, name_of, read_header
 from mesoslip.measured.reading.table import Table, listed
 from mesoslip.measured.units import plain, size_of, unit_named
 

@@ -21,19 +21,9 @@ from mesoslip.configuration import arguments
 from mesoslip.errors import ConfigError, Problem, RunError
 from mesoslip.quantities import percent, with_unit
 from mesoslip.theory.contacts.steady import newborn_problems, steady_problems
-from mesoslip.theory.critical_spring import (
-    NO_GROWTH,
-    critical_spring,
-    has_critical_spring,
-)
+from mesoslip.theory.critical_spring import NO_GROWTH, critical_spring, has_critical_spring
 from mesoslip.theory.delays import delay_law
-from mesoslip.theory.frequency_paths import (
-    MAX_POINTS,
-    Parts,
-    Turns,
-    counting_path,
-    search_path,
-)
+from mesoslip.theory.frequency_paths import MAX_POINTS, Parts, Turns, counting_path, search_path
 from mesoslip.theory.sliders import dynamic_stiffness, stability_problems
 
 if TYPE_CHECKING:

@@ -28,8 +28,6 @@ MIN_DRIFT = 4.0
 RELAXED = 0.5
 # Points from which the error of a sum over correlated noise is computed.
 MAX_POINTS = 400
-# Share of the samples from which on impulses are reported to be many.
-MANY_IMPULSES = 0.05
 
 
 @dataclass(frozen=True)

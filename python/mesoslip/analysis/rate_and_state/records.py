@@ -13,12 +13,7 @@ import numpy as np
 from mesoslip.analysis.experiment_stages import Experiment, Stage
 from mesoslip.analysis.rate_and_state.law import LAWS
 from mesoslip.analysis.rate_and_state.noise import Noise, known_noise
-from mesoslip.analysis.rate_and_state.points import (
-    Loading,
-    Points,
-    points_of_run,
-    points_of_trace,
-)
+from mesoslip.analysis.rate_and_state.points import Loading, Points, points_of_run, points_of_trace
 from mesoslip.array_types import Array
 from mesoslip.quantities import with_unit
 

@@ -12,12 +12,7 @@ from numpy.typing import NDArray
 from mesoslip.array_types import Array, Dataset, DataTree
 from mesoslip.output.access import config_of
 from mesoslip.plots.movie import Movie
-from mesoslip.plots.snapshots import (
-    chosen_snapshot,
-    draw_time_bar,
-    snapshot_frames,
-    snapshots_of,
-)
+from mesoslip.plots.snapshots import chosen_snapshot, draw_time_bar, snapshot_frames, snapshots_of
 from mesoslip.plots.style import BLUE, RED, Canvas, canvas, legend_above, legend_rows
 from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import scale_for, with_unit

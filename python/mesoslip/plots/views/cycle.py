@@ -8,15 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from mesoslip.array_types import DataTree
-from mesoslip.plots.style import (
-    CONTACT,
-    SPRING,
-    Canvas,
-    canvas,
-    curve_style,
-    legend_above,
-    titles,
-)
+from mesoslip.plots.style import CONTACT, SPRING, Canvas, canvas, curve_style, legend_above, titles
 from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import Scale, scale_for, with_unit
 

@@ -12,10 +12,11 @@ from mesoslip.array_types import Array, DataTree
 INTERVAL_TOLERANCE = 1e-3
 
 
-def even_trace(tree: DataTree, realization: int = 0) -> tuple[Array, Array]:
-    """Times [s] and spring force [N] at equal intervals, interpolated where intervals differ."""
+def even_trace(tree: DataTree) -> tuple[Array, Array]:
+    """Times [s] and spring force [N] of the first realization at equal intervals,
+    interpolated where they differ."""
     root = tree.to_dataset()
-    force = root["spring_force"].values[realization].astype(float)
+    force = root["spring_force"].values[0].astype(float)
     is_known = np.isfinite(force)
     time, force = root["time"].values[is_known], force[is_known]
     steps = np.diff(time)

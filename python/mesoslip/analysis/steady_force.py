@@ -27,6 +27,8 @@ MIN_BLOCKS = 6
 MAX_DRIFT = 3.0
 # Minimum drift over the mean: a record without noise relaxes forever.
 MIN_DRIFT = 1e-4
+# Half the width of a 95 % interval over the standard error.
+NORMAL_95 = 1.96
 # Deviations over the mean that are rounding errors.
 ROUNDING = 1e-9
 

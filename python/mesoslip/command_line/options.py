@@ -123,12 +123,11 @@ def executor_of(
     workers: int | None, scheduler: str | None = None, pool: str | None = None
 ) -> ExecutorLike:
     """The executor that options name; without them the default of the command."""
-    from mesoslip.errors import ConfigError, Problem
+    from mesoslip.configuration.arguments import check_choice
     from mesoslip.execution.executors import Dask, Processes, Threads, ThreadsThenProcesses
 
     pools = {"threads": Threads, "processes": Processes, "both": ThreadsThenProcesses}
-    if pool is not None and pool not in pools:
-        raise ConfigError([Problem("", "--pool", f"must be one of {', '.join(pools)}", pool)])
+    check_choice("--pool", pool, pools)
     if scheduler is not None:
         return Dask(scheduler)
     return workers if pool is None else pools[pool](workers)
@@ -275,11 +274,12 @@ def quantity(
     negative: bool = True,
 ) -> float:
     """The value of an option that is a quantity, in SI."""
-    from mesoslip.configuration.units import to_si
+    from mesoslip.configuration.units import is_number, to_si
     from mesoslip.errors import ConfigError, Problem
 
     try:
-        value = to_si(_number_or_text(text), unit, example)
+        # A plain number is in SI.
+        value = to_si(float(text) if is_number(text) else text, unit, example)
     except ValueError as error:
         raise ConfigError([Problem("", option, str(error), text)]) from None
     if positive and value <= 0:
@@ -289,21 +289,9 @@ def quantity(
     return value
 
 
-def _number_or_text(text: str) -> float | str:
-    """A plain number, which is in SI; or a string with a unit."""
-    from mesoslip.configuration.units import number_of
-
-    try:
-        return number_of(text)
-    except ValueError:
-        return text
-
-
-def quantity_or_none(
-    text: str | None, option: str, unit: str, example: str, *, positive: bool = False
-) -> float | None:
-    """The value of an option that is a quantity, in SI; None without it."""
-    return None if text is None else quantity(text, option, unit, example, positive=positive)
+def positive_or_none(text: str | None, option: str, unit: str, example: str) -> float | None:
+    """The value of an option that is a quantity above 0, in SI; None without it."""
+    return None if text is None else quantity(text, option, unit, example, positive=True)
 
 
 def share(text: str, option: str) -> float:

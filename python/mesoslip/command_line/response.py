@@ -15,9 +15,9 @@ from mesoslip.command_line.options import (
     TableOption,
     interruptible,
     output_option,
+    positive_or_none,
     print_json,
     print_table,
-    quantity_or_none,
     write_table,
 )
 from mesoslip.errors import ConfigError, FileError, Problem
@@ -89,7 +89,7 @@ def response(
     from mesoslip.output import targets
     from mesoslip.output.table_files import latex, markdown
 
-    scale = quantity_or_none(normal_force, "--normal-force", "N", "10 mN", positive=True)
+    scale = positive_or_none(normal_force, "--normal-force", "N", "10 mN")
     targets.check_writable(table, outputs)
     own = {"--output": output, "--law": law, "--samples": samples, "--seed": seed}
     others = {"--normal-force": normal_force, "--no-fit": None if fit else True}

@@ -23,6 +23,7 @@ from itertools import combinations_with_replacement
 import numpy as np
 from numpy.typing import NDArray
 
+from mesoslip.analysis.noise.levels import NORMAL_MEDIAN
 from mesoslip.array_types import Array
 
 # Maximum deviation of a summary, in spreads of the simulations.
@@ -35,8 +36,6 @@ MAX_LEVERAGE = 1 - 1e-6
 SIMULATIONS_PER_TERM = 8
 # Degrees of freedom of t distributions; the normal one is a further candidate.
 FREEDOMS = (3.0, 4.0, 6.0, 9.0, 14.0, 25.0)
-# Median of the absolute value of a standard normal deviate.
-NORMAL_MEDIAN = 0.6744897501960817
 # Minimum number of simulations for a correction of the likelihood, their maximum deviation in
 # standard deviations, and minimum factor of the width.
 MIN_CORRECTION = 20

@@ -16,6 +16,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from mesoslip.analysis.noise.levels import NORMAL_MEDIAN
 from mesoslip.array_types import Array
 
 Integers = NDArray[np.int64]
@@ -53,8 +54,6 @@ HOLD_ERRORS = 3.0
 # Minimum noise by rounding, over the range of the displacement, and in metres.
 MIN_NOISE = 1e-9
 MIN_DEVIATION = 1e-15
-# Median of the absolute value of a standard normal deviate.
-NORMAL_MEDIAN = 0.6744897501960817
 
 
 @dataclass(frozen=True)

@@ -146,12 +146,18 @@ MEASURED = Group(
     sliding_speed=Meaning("m s-1", "speed of sliding"),
     acoustic_emission=Meaning("V", "acoustic emission, or another second channel"),
 )
-FORCES = ("spring_force", "friction_coefficient")
+# Variables with the force of a run or of a measured trace, and their units.
+FORCES = {"spring_force": "N", "friction_coefficient": "1"}
 
 
 def has_force(names: Container[Any]) -> bool:
     """Whether variables are those of a run or of a measured trace."""
     return any(one in names for one in FORCES)
+
+
+def force_among(names: Container[Any]) -> str:
+    """The force at the drive, or the friction coefficient of a measured trace without forces."""
+    return "spring_force" if "spring_force" in names else "friction_coefficient"
 
 
 ROOT = Group(

@@ -9,11 +9,11 @@ import numpy as np
 from mesoslip.array_types import Dataset, DataTree
 from mesoslip.errors import FileError
 from mesoslip.output.access import group_of
+from mesoslip.output.variables import force_among
 from mesoslip.plots.axis import time_since
 from mesoslip.plots.curves import curve, draw_curves
 from mesoslip.plots.extent import Extent
 from mesoslip.plots.movie import chosen_frames, time_bar
-from mesoslip.plots.trace_variables import driving_force_of
 
 
 def chosen_snapshot(tree: DataTree, number: int | None = None) -> Dataset:
@@ -65,7 +65,7 @@ def draw_time_bar(axes: Any, tree: DataTree, snapshot: Dataset, times: Any) -> A
     window = window if window[1] > window[0] else (float(whole[0]), float(whole[-1]))
     extent = Extent(int(snapshot["realization_index"].item()), *window)
     horizontal = time_since(window)
-    name = driving_force_of(tree)
+    name = force_among(tree.data_vars)
     draw_curves(axes, [curve(tree, name, extent, color="black")], name, horizontal, "force")
     bar = time_bar(axes)
 

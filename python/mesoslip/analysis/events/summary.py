@@ -13,7 +13,8 @@ import numpy as np
 from mesoslip.analysis.events.channel import CHANNEL, Emissions, emissions_of
 from mesoslip.analysis.events.laws import BValue, Omori, b_value, omori
 from mesoslip.array_types import Array
-from mesoslip.errors import ConfigError, FileError, Problem
+from mesoslip.configuration.arguments import check_choice
+from mesoslip.errors import FileError
 from mesoslip.output.access import group_of
 from mesoslip.output.arrays import Tree
 from mesoslip.output.inputs import OutputLike, opened_run_arrays
@@ -140,13 +141,6 @@ class EventSummary:
         }
 
 
-def check_catalogue(key: str, catalogue: str | None) -> None:
-    """Check the name of a catalogue."""
-    if catalogue is not None and catalogue not in CATALOGUES:
-        names = ", ".join(CATALOGUES)
-        raise ConfigError([Problem("", key, f"must be one of {names}", catalogue)])
-
-
 def events_of(
     tree: Tree,
     catalogue: str | None = None,
@@ -265,7 +259,7 @@ def events(
     ConfigError
         If there is no catalogue of that name.
     """
-    check_catalogue("catalogue", catalogue)
+    check_choice("catalogue", catalogue, CATALOGUES)
     with opened_run_arrays(output) as tree:
         return events_of(
             tree, catalogue, threshold=threshold, completeness=completeness, main_size=main_size

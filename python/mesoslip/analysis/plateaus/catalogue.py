@@ -15,12 +15,13 @@ from numpy.typing import NDArray
 from mesoslip.analysis.apparatus import apparatus_of
 from mesoslip.analysis.plateaus.levels import Level, levels_of
 from mesoslip.analysis.printed_columns import printed_columns
-from mesoslip.analysis.steady_force import steady_mean
+from mesoslip.analysis.steady_force import NORMAL_95, steady_mean
 from mesoslip.analysis.strokes import output_pieces
 from mesoslip.array_types import Array, Dataset
 from mesoslip.configuration import arguments
+from mesoslip.configuration.arguments import check_choice
 from mesoslip.configuration.units import to_si
-from mesoslip.errors import ConfigError, FileError, Problem
+from mesoslip.errors import FileError
 from mesoslip.output.access import group_of
 from mesoslip.output.arrays import Tree
 from mesoslip.output.inputs import OutputLike, opened_run_arrays
@@ -62,8 +63,6 @@ MIN_SAMPLES = 5
 STAGES, FORCE = "stages of the load point", "force"
 # Names of the signals for `signal`, and in messages.
 SIGNALS = ("speed", "load", FORCE)
-# Half the width of a 95 % interval over the standard error.
-NORMAL_95 = 1.96
 
 
 @dataclass(frozen=True)
@@ -283,12 +282,6 @@ def _mean_of(values: Array) -> tuple[float, float]:
     return float(values.mean()), width * float(values.std(ddof=1)) / math.sqrt(values.size)
 
 
-def check_signal(key: str, signal: str | None) -> None:
-    """Check the name of a signal."""
-    if signal is not None and signal not in SIGNALS:
-        raise ConfigError([Problem("", key, f"must be one of {', '.join(SIGNALS)}", signal)])
-
-
 def plateaus_from(data: Dataset) -> Plateaus:
     """The plateaus that `plateaus` returned."""
     columns = {str(name): one.values for name, one in data.data_vars.items()}
@@ -328,7 +321,7 @@ def plateaus(
     ConfigError
         If the signal is another one, or the viscosity not above 0.
     """
-    check_signal("signal", signal)
+    check_choice("signal", signal, SIGNALS)
     with opened_run_arrays(output) as tree:
         found = plateaus_of(tree, signal=signal, viscosity=viscosity)
     known = {} if found.viscosity is None else {"viscosity": found.viscosity}

@@ -23,11 +23,11 @@ from mesoslip.output.arrays import Tree
 from mesoslip.output.inputs import OutputLike, opened_run_arrays
 from mesoslip.output.table_files import PrintedTable, rows_of, write_tables
 from mesoslip.output.variables import (
-    FORCES,
     REALIZATION_INDEX,
     Estimate,
     Group,
     Meaning,
+    force_among,
     with_force_unit,
 )
 from mesoslip.quantities import with_error, with_unit
@@ -183,7 +183,7 @@ def strokes_of(
     guess = ""
     if period == "auto":
         root = tree.to_dataset()
-        force = root[next(one for one in FORCES if one in root)].values[realization or 0]
+        force = root[force_among(root)].values[realization or 0]
         known = np.isfinite(force)
         period = found_period(root["time"].values[known], force[known])
         if period is None:
@@ -306,7 +306,8 @@ def strokes(
     """
     import xarray as xr
 
-    check_middle("middle", middle)
+    if not 0 < middle <= 1:
+        raise ConfigError([Problem("", "middle", "must be between 0 and 100 %", middle)])
     if period not in {None, "auto"} and not 0 < float(period or 0) < math.inf:
         raise ConfigError([Problem("", "period", "must be a time above 0", period)])
     with opened_run_arrays(output) as tree:
@@ -318,9 +319,3 @@ def strokes(
     result = xr.DataTree.from_dict(groups)
     result.attrs |= {"source": found.source, "middle": middle, "notes": "\n".join(found.notes)}
     return result
-
-
-def check_middle(key: str, middle: float) -> None:
-    """Check that the middle is a share of a stroke."""
-    if not 0 < middle <= 1:
-        raise ConfigError([Problem("", key, "must be between 0 and 100 %", middle)])

@@ -9,8 +9,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from mesoslip.analysis.steady_force import steady_mean, transient
-from mesoslip.analysis.strokes.measure import NORMAL_95, Measured, Stroke
+from mesoslip.analysis.steady_force import NORMAL_95, steady_mean, transient
+from mesoslip.analysis.strokes.measure import Measured, Stroke
 from mesoslip.analysis.strokes.record import StrokeRecord
 from mesoslip.array_types import Array
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 
-from mesoslip.analysis.apparatus import FORCES
 from mesoslip.array_types import Array, DataTree
+from mesoslip.output.variables import FORCES, force_among
 from mesoslip.plots.key_names import plain
 from mesoslip.plots.parameter_pairs import draw_pairs
 from mesoslip.plots.printing import current, is_narrow
@@ -37,7 +37,7 @@ def draw(tree: DataTree, _: Options, figure: Canvas | None) -> Canvas:
 def _parts(tree: DataTree) -> tuple[Array, Array, Array, Scale, Scale]:
     """Displacement of the load point, force and predicted forces in units for print."""
     observed = tree["observed_data"].to_dataset()
-    name = next(one for one in FORCES if one in observed)
+    name = force_among(observed)
     predicted = tree["posterior_predictive"].to_dataset()[name].values[0]
     force, moved = observed[name].values, observed["drive_displacement"].values
     unit = scale_for(float(np.max(np.abs(force))), FORCES[name])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -38,6 +38,12 @@ SUMMARIES = Group(
 PERCENTILES: tuple[float, ...] = (5.0, 25.0, 50.0, 75.0, 95.0)
 VERDICTS = ("not determined", "narrowed", "determined")
 SLIP_COLUMNS = ("start_time", "end_time", "force_before", "force_after")
+# Meanings of columns of the table.
+MEANINGS = {
+    "declared": "value that the first trace declares, in SI",
+    "width": "standard deviation of the logarithm, of a normal prior",
+    "information": "fraction of the variance predicted by a group of summaries alone",
+}
 # Minimum significant digits of values in a table.
 MIN_DIGITS = 3
 
@@ -89,21 +95,9 @@ def build_tree(fitted: FitResult) -> DataTree:
     plan, estimate = fitted.plan, fitted.estimate
     prior = plan.prior
     values = prior.values(estimate.chains)
-    chains = {"chain": np.arange(len(values)), "draw": np.arange(values.shape[1])}
-
-    def group(draws: Array, coordinates: dict[str, NDArray[np.int_]]) -> Dataset:
-        return xr.Dataset(
-            {
-                one.key: (
-                    ("chain", "draw"),
-                    draws[..., index],
-                    {"units": cf_units(one.unit), "long_name": one.key},
-                )
-                for index, one in enumerate(prior.free)
-            },
-            coordinates,
-        )
-
+    attributes_of = {
+        one.key: {"units": cf_units(one.unit), "long_name": one.key} for one in prior.free
+    }
     rng = np.random.default_rng([plan.seed, 2])
     from_prior = prior.values(rng.random((1, 1000, len(prior))))
     needs = needed_groups(prior, fitted.information)
@@ -134,8 +128,8 @@ def build_tree(fitted: FitResult) -> DataTree:
         attributes["filter_time"] = plan.filter_time
     groups = {
         "/": xr.Dataset(attrs=program_attributes(plan.config, "fit") | attributes),
-        "/posterior": group(values, chains),
-        "/prior": group(from_prior, {"chain": np.arange(1), "draw": np.arange(1000)}),
+        "/posterior": draws_group(values, attributes_of),
+        "/prior": draws_group(from_prior, attributes_of),
         "/summaries": summaries_group(
             fitted.simulator.features,
             fitted.observed,
@@ -148,6 +142,19 @@ def build_tree(fitted: FitResult) -> DataTree:
     for number, one in enumerate(fitted.predictions):
         groups |= trace_groups(one, number)
     return xr.DataTree.from_dict(groups)
+
+
+def draws_group(values: Array, attributes: Mapping[str, Mapping[str, str]]) -> Dataset:
+    """Draws in SI, of shape (chains, draws, parameters), as variables with attributes by name."""
+    import xarray as xr
+
+    return xr.Dataset(
+        {
+            name: (("chain", "draw"), values[..., index], one)
+            for index, (name, one) in enumerate(attributes.items())
+        },
+        {"chain": np.arange(len(values)), "draw": np.arange(values.shape[1])},
+    )
 
 
 def suffix(number: int) -> str:
@@ -307,37 +314,26 @@ def _parameters(fitted: FitResult, needs: dict[str, tuple[str, ...]]) -> Dataset
     groups = list(fitted.information)
     declared = fitted.simulator.experiments[0].apparatus.declared
     percentiles = np.percentile(prior.values(draws), PERCENTILES, axis=0).T
-    return xr.Dataset(
-        {
-            "value": (("parameter", "percentile"), percentiles),
-            "units": ("parameter", [one.unit for one in prior.free]),
-            "follows_from": ("parameter", ["\n".join(needs[one.key]) for one in prior.free]),
-            "declared": (
-                "parameter",
-                [declared.get(one.key, math.nan) for one in prior.free],
-                {"long_name": "value that the first trace declares, in SI"},
-            ),
-            "width": (
-                "parameter",
-                [one.width for one in prior.free],
-                {"long_name": "standard deviation of the logarithm, of a normal prior"},
-            ),
-            "low": ("parameter", [one.low for one in prior.free]),
-            "high": ("parameter", [one.high for one in prior.free]),
-            "is_logarithmic": ("parameter", [int(one.is_logarithmic) for one in prior.free]),
-            "shrinkage": ("parameter", shrinkage(draws)),
-            "information": (
-                ("parameter", "feature_group"),
-                np.array([fitted.information[one] for one in groups]).T,
-                {"long_name": "fraction of the variance predicted by a group of summaries alone"},
-            ),
-        },
-        {
-            "parameter": list(prior.keys),
-            "percentile": list(PERCENTILES),
-            "feature_group": groups,
-        },
+    information = np.array([fitted.information[one] for one in groups]).T
+    columns = {
+        "units": [one.unit for one in prior.free],
+        "follows_from": ["\n".join(needs[one.key]) for one in prior.free],
+        "declared": [declared.get(one.key, math.nan) for one in prior.free],
+        "width": [one.width for one in prior.free],
+        "low": [one.low for one in prior.free],
+        "high": [one.high for one in prior.free],
+        "is_logarithmic": [int(one.is_logarithmic) for one in prior.free],
+        "shrinkage": shrinkage(draws),
+    }
+    found = xr.Dataset(
+        {"value": (("parameter", "percentile"), percentiles)}
+        | {name: ("parameter", one) for name, one in columns.items()}
+        | {"information": (("parameter", "feature_group"), information)},
+        {"parameter": list(prior.keys), "percentile": list(PERCENTILES), "feature_group": groups},
     )
+    for name, meaning in MEANINGS.items():
+        found[name].attrs["long_name"] = meaning
+    return found
 
 
 def table(tree: DataTree) -> list[Row]:

@@ -12,13 +12,13 @@ import numpy as np
 
 from mesoslip.analysis.experiment_stages import Experiment
 from mesoslip.analysis.rate_and_state import LAWS, assessment, records_of
-from mesoslip.array_types import Array, Dataset, DataTree
+from mesoslip.array_types import Dataset, DataTree
 from mesoslip.configuration import arguments
 from mesoslip.configuration.units import cf_units, from_cf_units
 from mesoslip.errors import ConfigError, FileError, Problem
 from mesoslip.execution.stop import StopRequest
 from mesoslip.inference.checks import MAX_R_HAT, draw_warnings, shrinkage
-from mesoslip.inference.posterior import PERCENTILES, interval_digits, suffix
+from mesoslip.inference.posterior import PERCENTILES, draws_group, interval_digits, suffix
 from mesoslip.inference.prior import Prior
 from mesoslip.inference.rate_posterior import NOISE, RatePosterior, sample_laws
 from mesoslip.inference.sampler import r_hat
@@ -178,11 +178,18 @@ def _build_tree(
     for number, one in enumerate(found):
         after, prior, values = suffix(number), one.prior, one.values
         law = {"law": one.fit.law.name, "verdict": one.fit.verdict}
+        attributes_of = {
+            each.key: {
+                "units": with_force_unit(cf_units(each.unit), unit),
+                "long_name": NAMES[each.key][1],
+            }
+            for each in prior.free
+        }
         from_prior = prior.values(rng.random((1, PRIOR_DRAWS, len(prior))))
         predicted = one.predicted(min(PREDICTIONS, len(one.draws)), rng)
         groups |= {
-            f"/posterior{after}": _draws(prior, values, unit, law),
-            f"/prior{after}": _draws(prior, from_prior, unit, law),
+            f"/posterior{after}": draws_group(values, attributes_of).assign_attrs(law),
+            f"/prior{after}": draws_group(from_prior, attributes_of).assign_attrs(law),
             f"/posterior_predictive{after}": xr.Dataset(
                 {force_name: (("chain", "draw", "time"), predicted[None], force)},
                 {"chain": [0], "draw": np.arange(len(predicted)), "time": time},
@@ -228,27 +235,6 @@ def _warnings(one: RatePosterior) -> list[str]:
     return found
 
 
-def _draws(prior: Prior, values: Array, unit: str, attributes: dict[str, str]) -> Dataset:
-    """Draws in SI, of shape (chains, draws, parameters), as variables."""
-    import xarray as xr
-
-    return xr.Dataset(
-        {
-            one.key: (
-                ("chain", "draw"),
-                values[..., index],
-                {
-                    "units": with_force_unit(cf_units(one.unit), unit),
-                    "long_name": NAMES[one.key][1],
-                },
-            )
-            for index, one in enumerate(prior.free)
-        },
-        {"chain": np.arange(len(values)), "draw": np.arange(values.shape[1])},
-        attributes,
-    )
-
-
 def _parameters(one: RatePosterior, unit: str) -> Dataset:
     """The table of a law: its parameters, with a - b after those of the states, and the noise."""
     import xarray as xr
@@ -267,36 +253,21 @@ def _parameters(one: RatePosterior, unit: str) -> Dataset:
     def of_prior(attribute: str) -> list[float]:
         return [float(getattr(known.get(name), attribute, math.nan)) for name in names]
 
+    percentiles = [np.percentile(columns.get(name, rate), PERCENTILES) for name in names]
+    units = [known[name].unit if name in known else "N" for name in names]
+    table = {
+        "units": [with_force_unit(cf_units(one), unit) for one in units],
+        "least_squares": [noise[name] if name in noise else fit.value(name) for name in names],
+        "least_squares_error": [math.nan if name in noise else fit.error(name) for name in names],
+        "low": of_prior("low"),
+        "high": of_prior("high"),
+        "is_logarithmic": [int(name in known and known[name].is_logarithmic) for name in names],
+        "shrinkage": [shrunk.get(name, math.nan) for name in names],
+        "r_hat": [rhat.get(name, math.nan) for name in names],
+    }
     return xr.Dataset(
-        {
-            "value": (
-                ("parameter", "percentile"),
-                [np.percentile(columns.get(name, rate), PERCENTILES) for name in names],
-            ),
-            "units": (
-                "parameter",
-                [
-                    with_force_unit(cf_units(known[name].unit if name in known else "N"), unit)
-                    for name in names
-                ],
-            ),
-            "least_squares": (
-                "parameter",
-                [noise[name] if name in noise else fit.value(name) for name in names],
-            ),
-            "least_squares_error": (
-                "parameter",
-                [math.nan if name in noise else fit.error(name) for name in names],
-            ),
-            "low": ("parameter", of_prior("low")),
-            "high": ("parameter", of_prior("high")),
-            "is_logarithmic": (
-                "parameter",
-                [int(name in known and known[name].is_logarithmic) for name in names],
-            ),
-            "shrinkage": ("parameter", [shrunk.get(name, math.nan) for name in names]),
-            "r_hat": ("parameter", [rhat.get(name, math.nan) for name in names]),
-        },
+        {"value": (("parameter", "percentile"), percentiles)}
+        | {name: ("parameter", one) for name, one in table.items()},
         {"parameter": names, "percentile": list(PERCENTILES)},
     )
 

@@ -35,8 +35,7 @@ class Extremes:
 
     @cached_property
     def _cycle_sizes(self) -> Array:
-        sizes: Array = np.abs(self.values[self.first] - self.values[self.second])
-        return sizes
+        return np.abs(self.values[self.first] - self.values[self.second])
 
     @cached_property
     def fall_sizes(self) -> Array:

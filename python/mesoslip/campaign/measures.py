@@ -66,8 +66,7 @@ class RunView:
             return np.empty(0)
         rows = self.tree.children[group].to_dataset()
         wanted = rows["start_time"].values >= self.start
-        values: Array = rows[name].values[wanted].astype(np.float64)
-        return values
+        return rows[name].values[wanted].astype(np.float64)
 
 
 Function = Callable[[RunView], float]

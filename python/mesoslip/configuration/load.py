@@ -287,8 +287,7 @@ class Load(Table):
         times = np.asarray(time, dtype=float)
         if self.cycle is not None:
             angle = 2 * math.pi * self.cycle.frequency * times + self.cycle.phase
-            wave: Array = self.normal_force + self.cycle.amplitude * np.sin(angle)
-            return wave
+            return self.normal_force + self.cycle.amplitude * np.sin(angle)
         if not self.parts:
             return np.full_like(times, self.normal_force)
         durations, first, last = (np.array(one) for one in zip(*self.parts, strict=True))

@@ -63,10 +63,7 @@ class Projection:
 
     def __call__(self, summaries: Array) -> Array:
         """Statistics, shape (..., parameters)."""
-        statistics: Array = (
-            _with_squares(self.scores(summaries), self.has_squares) @ self.weights + self.offset
-        )
-        return statistics
+        return _with_squares(self.scores(summaries), self.has_squares) @ self.weights + self.offset
 
 
 def _with_squares(scores: Array, has_squares: bool) -> Array:
@@ -170,8 +167,7 @@ class Surrogate:
 
     def mean(self, parameters: Array) -> Array:
         """Expected statistics, shape (..., statistics)."""
-        mean: Array = self._terms(parameters) @ self.coefficients
-        return mean
+        return self._terms(parameters) @ self.coefficients
 
     def _terms(self, parameters: Array) -> Array:
         return _terms((parameters - self.centre) / self.spread, self.powers)
@@ -336,11 +332,8 @@ def _tails(distance: Array, size: int) -> tuple[float, float]:
     from scipy.special import gammaln
 
     square = float(np.mean(distance)) / size
-    best = (
-        -0.5 * float(np.mean(distance)) / square - 0.5 * size * math.log(square) + _normal(size),
-        math.inf,
-        math.sqrt(square),
-    )
+    value = -0.5 * float(np.mean(distance)) / square - 0.5 * size * math.log(square)
+    best = (value - 0.5 * size * math.log(2 * math.pi), math.inf, math.sqrt(square))
     for freedom in FREEDOMS:
         square = float(np.median(distance)) / size
         for _ in range(100):
@@ -353,10 +346,6 @@ def _tails(distance: Array, size: int) -> tuple[float, float]:
         if value > best[0]:
             best = (value, freedom, math.sqrt(square))
     return best[1], best[2]
-
-
-def _normal(size: int) -> float:
-    return -0.5 * size * math.log(2 * math.pi)
 
 
 def _validity(

@@ -260,8 +260,7 @@ class Summarizer:
         start = self.time[above]
         start[falls] += ((force[above] - half)[falls] / step[falls]) * self._interval
         points = start[:, np.newaxis] + WAVEFORM * self.period
-        waveforms: Array = np.interp(points, self.time, force)
-        return waveforms
+        return np.interp(points, self.time, force)
 
 
 def _loaded(force: Array) -> int:

@@ -289,8 +289,7 @@ def _costs(points: _Points, start: int) -> Array:
     # A record may be shorter than any piece.
     if start == 0 and t.size < MIN_LINE:
         line[-1] = 0.0
-    cost: Array = np.minimum(line, parabola)
-    return cost
+    return np.minimum(line, parabola)
 
 
 def _refined(points: _Points, bounds: Sequence[int]) -> Integers:

@@ -14,8 +14,7 @@ from mesoslip.output.arrays import Arrays, Tree
 
 def times_of(tree: Tree) -> Array:
     """Times of the trace [s]."""
-    times: Array = tree.to_dataset()["time"].values
-    return times
+    return tree.to_dataset()["time"].values
 
 
 @dataclass(frozen=True)
@@ -37,8 +36,7 @@ class Samples:
         if name == "time":
             return self.times[first:after]
         chosen = slice(self.start + first, self.start + after)
-        values: Array = self.data[name].isel({self.dimension: chosen}).values.astype(float)
-        return values
+        return self.data[name].isel({self.dimension: chosen}).values.astype(float)
 
 
 def samples(tree: Tree, realization: int = 0) -> list[Samples]:

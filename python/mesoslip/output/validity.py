@@ -62,12 +62,9 @@ def check_signature(path: Path) -> None:
             f"{path}: is a configuration, not an output (netCDF); run it first: mesoslip run {path}"
         )
     if start != b"\x89HDF\r\n\x1a\n":
-        hint = f"; mesoslip trace {path} makes an output of a table" if _is_table(path) else ""
+        is_table = path.suffix.lower() in {".csv", ".txt", ".dat", ".tsv"}
+        hint = f"; mesoslip trace {path} makes an output of a table" if is_table else ""
         raise FileError(f"{path}: not an output (netCDF-4){hint}")
-
-
-def _is_table(path: Path) -> bool:
-    return path.suffix.lower() in {".csv", ".txt", ".dat", ".tsv"}
 
 
 def check_output(tree: Tree, name: str | Path) -> None:

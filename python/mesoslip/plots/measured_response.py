@@ -49,8 +49,7 @@ def _horizontal(experiment: Experiment, found: Fit) -> Array:
     """Displacement of the load point at the points of a fit [m]."""
     points = found.law.points
     sign = experiment.stages[0].direction or 1.0
-    drive: Array = sign * np.interp(points.time + points.start, experiment.time, experiment.drive)
-    return drive
+    return sign * np.interp(points.time + points.start, experiment.time, experiment.drive)
 
 
 def _draw_fit(axes: Axes, experiment: Experiment, found: Fit, scale: Scale) -> None:

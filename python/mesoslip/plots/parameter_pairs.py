@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.ticker import MaxNLocator, ScalarFormatter
 
-from mesoslip.array_types import DataArray, DataTree
+from mesoslip.array_types import DataTree
 from mesoslip.configuration.units import from_cf_units
 from mesoslip.plots.key_names import symbol_or_name
 from mesoslip.plots.printing import UNLETTERED, is_narrow
@@ -14,11 +14,6 @@ from mesoslip.quantities import Scale, scale_for
 
 # Maximum number of draws of a pair of parameters that are shown.
 MAX_POINTS = 1500
-
-
-def _scale(draws: DataArray) -> Scale:
-    """The unit that suits the median of a parameter."""
-    return scale_for(float(np.median(np.abs(draws.values))), from_cf_units(draws.attrs["units"]))
 
 
 def _label(name: str, scale: Scale) -> str:
@@ -31,7 +26,9 @@ def draw_pairs(figure: Canvas, place: object, tree: DataTree) -> None:
     group, prior = tree["posterior"].to_dataset(), tree["prior"].to_dataset()
     names = [str(name) for name in group.data_vars]
     grid = place.subgridspec(len(names), len(names))  # type: ignore[attr-defined]
-    scales = {name: _scale(group[name]) for name in names}
+    medians = {name: float(np.median(np.abs(group[name].values))) for name in names}
+    units = {name: from_cf_units(group[name].attrs["units"]) for name in names}
+    scales = {name: scale_for(medians[name], units[name]) for name in names}
     draws = {name: group[name].values.ravel() / scales[name].size for name in names}
     thin = slice(None, None, max(1, len(draws[names[0]]) // MAX_POINTS))
     for row, below in enumerate(names):

@@ -122,8 +122,7 @@ class _Density:
 
                 def attached(threshold: Array, gap: Array = gap) -> Array:
                     birth = moved - gap[:, None] + back / np.sqrt(threshold)
-                    rate: Array = np.nan_to_num(breaks(birth))
-                    return rate
+                    return np.nan_to_num(breaks(birth))
 
                 density = self._average_between(lower, np.maximum(lower, upper), attached)
                 root = 0.5 * (shift + math.sqrt(shift**2 + 4 * back))

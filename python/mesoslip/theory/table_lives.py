@@ -72,8 +72,7 @@ class TableLives(NamedTuple):
     def above(self, stretch: Array) -> Array:
         """Probability that contacts of each cell break above stretches (stretches, cells)."""
         part = (self.high - stretch[:, None]) / (self.high - self.low)
-        values: Array = self.share * np.clip(part, 0, 1)
-        return values
+        return self.share * np.clip(part, 0, 1)
 
     def newborn_density(
         self, stretch: Array, moved: float, shift: float, breaks: Callable[[Array], Array]

@@ -132,8 +132,7 @@ def _prior(form: Form, count: int) -> Array:
 
 def _information(law: Law, count: int) -> Array:
     """Information of one size about the parameters, with that of the prior."""
-    information: Array = law.moments.covariance + np.diag(_prior(law.form, count))
-    return information
+    return law.moments.covariance + np.diag(_prior(law.form, count))
 
 
 def _moments(rule: Rule, features: Array, parameters: Array) -> _Moments:

@@ -138,8 +138,7 @@ def _products(covariance: Array) -> Array:
     """Sums of products of residuals around polynomials, by lag, for noise with a covariance."""
     length = len(covariance)
     residual = _without_polynomials(_without_polynomials(covariance).T)
-    products: Array = np.array([np.trace(residual, lag) for lag in range(length // 2)])
-    return products
+    return np.array([np.trace(residual, lag) for lag in range(length // 2)])
 
 
 def _windows(force: Array, length: int) -> Array:

@@ -56,8 +56,7 @@ class Windows:
 
     def max_of(self, values: NDArray[Value]) -> NDArray[Value]:
         """The maximum of values of ``samples`` in each window."""
-        found: NDArray[Value] = np.maximum.reduceat(values, self.starts)
-        return found
+        return np.maximum.reduceat(values, self.starts)
 
     def mean_of(self, values: Array) -> Array:
         """The mean of values of ``samples`` in each window."""

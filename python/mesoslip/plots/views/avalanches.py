@@ -100,8 +100,7 @@ def scaling_sizes(tree: DataTree) -> Array:
     if "avalanches" not in tree.children:
         raise FileError(NO_AVALANCHES)
     data = group_of(tree, "avalanches")
-    sizes: Array = data["size"].values[~failures(tree, data)]
-    return sizes
+    return data["size"].values[~failures(tree, data)]
 
 
 def draw_distribution(

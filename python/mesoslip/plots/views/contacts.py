@@ -88,8 +88,7 @@ class _Histogram:
         legend_above(axes)
 
     def _counts(self, values: Array) -> NDArray[np.intp]:
-        counts: NDArray[np.intp] = np.histogram(values[np.isfinite(values)], self.edges)[0]
-        return counts
+        return np.histogram(values[np.isfinite(values)], self.edges)[0]
 
     def show(self, snapshot: Dataset, after: Dataset | None) -> None:
         """Show a snapshot, with the contacts that break before the next one."""

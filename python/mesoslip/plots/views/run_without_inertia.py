@@ -83,15 +83,9 @@ def _positions(tree: Tree, data: Dataset | Arrays, extent: Extent) -> Array:
     if name == "time":
         return starts
     if name == "displacement":
-        displacements: Array = data["displacement"].values
-        return displacements
+        return data["displacement"].values
     moved = tree.to_dataset()[name].isel(realization=extent.first).values
-    positions: Array = np.interp(starts, times_of(tree), moved)
-    return positions
-
-
-def _jumps(tree: Tree) -> bool:
-    return not is_measured(tree) and config_of(tree).slider.jumps
+    return np.interp(starts, times_of(tree), moved)
 
 
 VIEW = View(
@@ -104,5 +98,5 @@ VIEW = View(
     compare_all=run.compare,
     compare_panel=run.compare_forces,
     takes_arrays=True,
-    applies=_jumps,
+    applies=lambda tree: not is_measured(tree) and config_of(tree).slider.jumps,
 )

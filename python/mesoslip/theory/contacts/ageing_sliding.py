@@ -118,8 +118,7 @@ class AgeingSliding(LinearStability):
         weight, age = (one.reshape(-1, POINTS) for one in self._ends[:2])
         likely = weight.sum(axis=1) > UNLIKELY
         longest = float(np.max(np.ptp(age[likely], axis=1)))
-        dephased: NDArray[np.bool_] = np.abs(rate) * longest > MAX_TURN
-        return dephased
+        return np.abs(rate) * longest > MAX_TURN
 
     @property
     def _turns(self) -> Turns:

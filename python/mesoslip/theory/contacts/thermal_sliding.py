@@ -166,8 +166,7 @@ class ThermalSliding(LinearStability):
         modes = np.array(mode_frequencies(self.config.slider))
         places = np.arange(0, len(modes), 1 / POINTS_A_MODE)
         between = np.interp(places, np.arange(len(modes)), modes) if modes.size else modes
-        resolved: Array = np.union1d(path, between[between < last])
-        return resolved
+        return np.union1d(path, between[between < last])
 
     @property
     def is_passive(self) -> bool:

@@ -264,10 +264,7 @@ def _events(
         for start, end in zip(np.append(0, ends[:-1]), ends, strict=True)
         if end > start
     ]
-    found = {
-        name: np.array([one.get(name, np.nan) for one in rows], dtype=meaning.dtype)
-        for name, meaning in EVENTS.items()
-    }
+    found = EVENTS.columns(rows)
     found["spring_force"][:] = _spring_forces(tree, found)
     return found
 

@@ -119,6 +119,11 @@ class Catalogue:
         """Write the catalogue as a table with the units in its header."""
         write_table(self.rows, {name: self.columns[name].unit for name in COLUMNS}, path)
 
+    @property
+    def tables(self) -> list[PrintedTable]:
+        """The slips for print."""
+        return [self.printed()]
+
     def printed(self) -> PrintedTable:
         """The slips as a table for print, a row for each, each column in one unit."""
         rows = self.rows

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import DTypeLike
+from numpy.typing import DTypeLike, NDArray
 
 from mesoslip.array_types import Dataset, Variable
 from mesoslip.simulation import fronts
@@ -88,6 +88,13 @@ class Group(dict[str, Meaning]):
     def units(self, force_unit: str = "N") -> dict[str, str]:
         """CF units of the variables; see `with_force_unit`."""
         return {name: with_force_unit(one.units, force_unit) for name, one in self.items()}
+
+    def columns(self, rows: Sequence[Mapping[str, Any]]) -> dict[str, NDArray[Any]]:
+        """Columns of rows; NaN for unknown values."""
+        return {
+            name: np.array([one.get(name, math.nan) for one in rows], dtype=meaning.dtype)
+            for name, meaning in self.items()
+        }
 
     @property
     def empty_row(self) -> dict[str, Any]:

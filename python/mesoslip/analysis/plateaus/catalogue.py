@@ -141,11 +141,7 @@ def plateaus_of(
         raise FileError(
             f"{name}: has no plateau by the {source}: no {MIN_SAMPLES} samples at one level"
         )
-    columns = {
-        key: np.array([one.get(key, math.nan) for one in rows], dtype=meaning.dtype)
-        for key, meaning in PLATEAUS.items()
-    }
-    return Plateaus(columns, apparatus.force_unit, source, viscosity)
+    return Plateaus(PLATEAUS.columns(rows), apparatus.force_unit, source, viscosity)
 
 
 def _viscosity(tree: Tree) -> float | None:

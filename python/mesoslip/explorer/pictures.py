@@ -42,7 +42,7 @@ CURVE_TOLERANCE = 1e-6
 # Force of a measured trace, and means over slips that are compared with it, with their units.
 MEASURED_FORCE = "spring_force"
 COMPARED = {"force_drop": "N", "duration": "s", "waiting_time": "s"}
-# Relative change of a velocity that is none.
+# Relative change up to which a velocity is constant.
 CONSTANT = 1e-9
 # Maximum work for the stability of steady sliding.
 MAX_WORK = 10_000

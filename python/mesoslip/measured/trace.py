@@ -96,7 +96,7 @@ class Understood:
         return [*self.record.summary, *self._noise_lines(MAX_RATES)]
 
     def _noise_lines(self, max_rates: float) -> list[str]:
-        """Lines about the noise, with that at each rate if there are at most so many."""
+        """Lines about the noise, with that at each rate up to a maximum number of rates."""
         if not isinstance(self.noise, TraceNoise):
             return []
         unit = "1" if self.record.is_friction else "N"

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from mesoslip.array_types import DataTree
 from mesoslip.configuration import arguments
 from mesoslip.configuration.config import Config
 from mesoslip.configuration.reading import PathLike
@@ -13,9 +14,6 @@ from mesoslip.output.inputs import as_config
 from mesoslip.output.tree import build_tree
 from mesoslip.simulation.run_realizations import run_realizations
 
-if TYPE_CHECKING:
-    import xarray as xr
-
 
 @arguments.checked(progress=arguments.function)
 def run(
@@ -23,7 +21,7 @@ def run(
     *,
     executor: ExecutorLike = None,
     progress: Callable[[float], None] | None = None,
-) -> xr.DataTree:
+) -> DataTree:
     """Simulate a configuration.
 
     Parameters

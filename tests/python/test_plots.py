@@ -15,7 +15,7 @@ from conftest import ROOT, klein_tables, long
 from kinds import configuration
 from matplotlib.figure import Figure
 from mesoslip.analysis.response import Line
-from mesoslip.command_line.view_summaries import summaries
+from mesoslip.command_line.pictures import summaries
 from mesoslip.configuration.config import Config
 from mesoslip.output import files
 from mesoslip.output.arrays import Stored

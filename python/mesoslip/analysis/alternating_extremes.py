@@ -14,7 +14,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from mesoslip.array_types import Array
+
 Samples = NDArray[np.int_]
 
 # Number of turning points below which cycles are found one by one.
@@ -34,8 +35,7 @@ class Extremes:
 
     @cached_property
     def _cycle_sizes(self) -> Array:
-        sizes: Array = np.abs(self.values[self.first] - self.values[self.second])
-        return sizes
+        return np.abs(self.values[self.first] - self.values[self.second])
 
     @cached_property
     def fall_sizes(self) -> Array:

@@ -18,9 +18,8 @@ from mesoslip.configuration.units import to_si
 from mesoslip.errors import ConfigError, FileError
 from mesoslip.output.access import group_of, is_measured
 from mesoslip.output.arrays import Tree
+from mesoslip.output.variables import FORCES, force_among, has_force
 
-# Variables for the force of an output, in order of preference, and their units.
-FORCES = {"spring_force": "N", "friction_coefficient": "1"}
 # Units of the stiffness by the unit of the force, with examples.
 STIFFNESSES = {"N": ("N/m", "97 N/m"), "1": ("1/m", "1.6e-3 1/um")}
 
@@ -30,7 +29,7 @@ class Apparatus:
     """Known properties of an apparatus."""
 
     force_name: str
-    """Variable of the output with the force, see `FORCES`."""
+    """Variable of the output with the force."""
     force_unit: str
     stiffness: float
     """Unit of the force per metre; infinite for a prescribed slider, NaN if unknown."""
@@ -50,9 +49,9 @@ class Apparatus:
 
 def apparatus_of(tree: Tree, name: str = "the output") -> Apparatus:
     """Properties of the apparatus according to an output; ``name`` is that in messages."""
-    force = next((one for one in FORCES if one in tree.data_vars), None)
-    if force is None:
+    if not has_force(tree.data_vars):
         raise FileError(f"{name}: is neither the output of a run nor a measured trace")
+    force = force_among(tree.data_vars)
     unit = FORCES[force]
     config = _config(tree, name)
     if config is not None:
@@ -80,12 +79,6 @@ def first_velocity(config: Config) -> float:
     parts = config.drive_parts
     velocities = (one for part in parts for one in (part.start_velocity, part.end_velocity))
     return next((one for one in velocities if one), 0.0)
-
-
-def with_force_unit(units: str, force_unit: str) -> str:
-    """CF units of a force in newtons, or of a friction coefficient if the force unit is "1"."""
-    first, _, others = units.partition(" ")
-    return others or "1" if force_unit == "1" and first == "N" else units
 
 
 def _config(tree: Tree, name: str) -> Config | None:

@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mesoslip.analysis.avalanche_sizes import (
-    REJECTED,
-    compare_laws,
-    fit_power_law,
-    local_exponents,
-)
+from mesoslip.analysis.avalanche_sizes import REJECTED, compare_laws, fit_power_law, local_exponents
+from mesoslip.array_types import Dataset, DataTree
 from mesoslip.configuration import arguments
 from mesoslip.configuration.config import Config
 from mesoslip.configuration.units import from_cf_units
@@ -22,9 +18,6 @@ from mesoslip.output.access import group_of
 from mesoslip.output.inputs import OutputLike, as_run
 from mesoslip.output.table_files import PrintedTable, write_table
 from mesoslip.quantities import column
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 NO_AVALANCHES = (
     "the output has no avalanches: they are recorded with [interaction] or "
@@ -92,7 +85,7 @@ MIN_LOCAL_COUNT = 50
 @arguments.checked(after=arguments.number(), min_force_ratio=arguments.number(0, 1))
 def avalanches(
     output: OutputLike, *, after: float = 0.0, min_force_ratio: float | None = None
-) -> xr.Dataset:
+) -> Dataset:
     """The catalogue of avalanches of an output, dimension ``avalanche``, in SI.
 
     See `mesoslip.avalanche_summary` for their statistics, and for fits and histograms of sizes
@@ -238,7 +231,7 @@ def warning(statistics: dict[str, float | None]) -> str | None:
     )
 
 
-def failures(tree: xr.DataTree, data: xr.Dataset) -> NDArray[np.bool_]:
+def failures(tree: DataTree, data: Dataset) -> NDArray[np.bool_]:
     """Whether each avalanche broke all remaining contacts; these follow no law of sizes."""
     config = Config.from_toml(tree.attrs["configuration"])
     if config.contacts.reattach:
@@ -253,20 +246,20 @@ def failures(tree: xr.DataTree, data: xr.Dataset) -> NDArray[np.bool_]:
     return failed
 
 
-def rows(data: xr.Dataset) -> list[dict[str, Any]]:
+def rows(data: Dataset) -> list[dict[str, Any]]:
     """The avalanches, a dictionary for each."""
     names = _columns(data)
     columns = [data[name].values.tolist() for name in names]
     return [dict(zip(names, row, strict=True)) for row in zip(*columns, strict=True)]
 
 
-def write_csv(data: xr.Dataset, path: Path) -> None:
+def write_csv(data: Dataset, path: Path) -> None:
     """Write avalanches as a table with the units in its header."""
     units = {name: data[name].attrs.get("units", "1") for name in _columns(data)}
     write_table(rows(data), units, path)
 
 
-def printed(data: xr.Dataset) -> PrintedTable:
+def printed(data: Dataset) -> PrintedTable:
     """Avalanches as a table for print, each column in one unit."""
     head, columns = [], []
     for name in _columns(data):
@@ -277,5 +270,5 @@ def printed(data: xr.Dataset) -> PrintedTable:
     return PrintedTable("Avalanches", tuple(head), tuple(zip(*columns, strict=True)))
 
 
-def _columns(data: xr.Dataset) -> list[str]:
+def _columns(data: Dataset) -> list[str]:
     return [str(name) for name in data.variables]

@@ -32,11 +32,6 @@ def _of_response(data: Any) -> _Writers:
     return _Writers(partial(response.tables, data), partial(response.write_csv, data))
 
 
-def _of_slips(data: Any) -> _Writers:
-    catalogue = slips.catalogue_from(data)
-    return _Writers(lambda: [catalogue.printed()], catalogue.write_csv)
-
-
 def _of_avalanches(data: Any) -> _Writers:
     return _Writers(lambda: [avalanches.printed(data)], partial(avalanches.write_csv, data))
 
@@ -49,7 +44,7 @@ BY_GROUP: dict[str, Callable[[Any], _Writers]] = {
 }
 BY_DIMENSION: dict[str, Callable[[Any], _Writers]] = {
     "plateau": partial(_own, plateaus.plateaus_from),
-    "slip": _of_slips,
+    "slip": partial(_own, slips.catalogue_from),
     "avalanche": _of_avalanches,
 }
 

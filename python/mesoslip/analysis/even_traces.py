@@ -3,24 +3,20 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    import xarray as xr
-
-Array = NDArray[np.float64]
+from mesoslip.array_types import Array, DataTree
 
 # Maximum relative difference of intervals that count as equal.
 INTERVAL_TOLERANCE = 1e-3
 
 
-def even_trace(tree: xr.DataTree, realization: int = 0) -> tuple[Array, Array]:
-    """Times [s] and spring force [N] at equal intervals, interpolated where intervals differ."""
+def even_trace(tree: DataTree) -> tuple[Array, Array]:
+    """Times [s] and spring force [N] of the first realization at equal intervals,
+    interpolated where they differ."""
     root = tree.to_dataset()
-    force = root["spring_force"].values[realization].astype(float)
+    force = root["spring_force"].values[0].astype(float)
     is_known = np.isfinite(force)
     time, force = root["time"].values[is_known], force[is_known]
     steps = np.diff(time)

@@ -8,24 +8,18 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mesoslip.analysis.apparatus import apparatus_of
 from mesoslip.analysis.steady_force import SteadyMean, steady_mean
 from mesoslip.analysis.stick_phases import relieved_loading
 from mesoslip.analysis.strokes import output_pieces
+from mesoslip.array_types import Array, Dataset
 from mesoslip.configuration.drive import DrivePart
 from mesoslip.errors import FileError
 from mesoslip.output.access import group_of, is_measured
 from mesoslip.output.arrays import Arrays, Tree
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-Array = NDArray[np.float64]
 
 # Displacement of the slider after a change of the drive within which a peak is attributed to the
 # change, in mean breaking stretches: all contacts break once or twice in it.
@@ -154,7 +148,7 @@ class Experiment:
         )
         self.stages = self._stages()
 
-    def _drive(self, root: xr.Dataset | Arrays) -> Array:
+    def _drive(self, root: Dataset | Arrays) -> Array:
         """Displacement of the load point [m], as recorded or by the velocity of the drive."""
         if "drive_displacement" in root:
             drive: Array = root["drive_displacement"].values[0]
@@ -169,7 +163,7 @@ class Experiment:
         elapsed: Array = time - time[0]
         return self.apparatus.velocity * elapsed
 
-    def _displacement(self, root: xr.Dataset | Arrays, count: int) -> Array:
+    def _displacement(self, root: Dataset | Arrays, count: int) -> Array:
         """Displacement of the slider [m]: recorded, or from load point and stretch of the spring.
 
         If the stiffness is unknown, the stretch is taken as 0.

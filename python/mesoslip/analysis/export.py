@@ -5,17 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from mesoslip.analysis.slips import slips
+from mesoslip.array_types import DataTree
 from mesoslip.configuration.reading import PathLike, as_path
 from mesoslip.errors import FileError
 from mesoslip.output.inputs import OutputLike, as_output
 from mesoslip.output.targets import written_whole
 from mesoslip.output.zarr import write_zarr
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 # Amplitudes of a slip: variable, type, category of QuakeML, and its unit.
 AMPLITUDES = (
@@ -58,14 +56,14 @@ def export(output: OutputLike, file: PathLike) -> None:
     write(as_output(output), path)
 
 
-def write_quakeml(tree: xr.DataTree, path: Path) -> None:
+def write_quakeml(tree: DataTree, path: Path) -> None:
     """Write the slips of an output as QuakeML."""
     catalogue = event_catalogue(tree)
     with written_whole(path) as part:
         catalogue.write(str(part), format="QUAKEML")
 
 
-def event_catalogue(tree: xr.DataTree) -> Any:
+def event_catalogue(tree: DataTree) -> Any:
     """The slips of an output as an ``obspy.core.event.Catalog``.
 
     A slip has an origin time and amplitudes: the drop of the force, the peak velocity, and the
@@ -139,7 +137,7 @@ def _unit(units: str, known: str) -> str:
     return "dimensionless" if units == "1" else known
 
 
-FORMATS: dict[str, Callable[[xr.DataTree, Path], None]] = {
+FORMATS: dict[str, Callable[[DataTree, Path], None]] = {
     ".zarr": write_zarr,
     ".xml": write_quakeml,
 }

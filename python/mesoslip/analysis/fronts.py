@@ -2,31 +2,25 @@
 
 from __future__ import annotations
 
-import csv
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip.analysis.avalanche_sizes import PowerLawFit, fit_power_law
+from mesoslip.array_types import Array, DataTree
 from mesoslip.configuration.config import Config
 from mesoslip.errors import FileError
 from mesoslip.output.access import config_of, group_of
 from mesoslip.output.arrays import Tree
 from mesoslip.output.inputs import OutputLike, opened_run_arrays
-from mesoslip.output.table_files import PrintedTable
-from mesoslip.output.targets import written_whole
+from mesoslip.output.table_files import PrintedTable, rows_of, write_tables
 from mesoslip.output.variables import FRONTS, Group, Meaning
 from mesoslip.quantities import column, number, with_error
 from mesoslip.simulation.fronts import ARRESTED, ARRESTS, KINDS, PRECURSOR
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-Array = NDArray[np.float64]
 
 NO_FRONTS = 'the output has no fronts: they are recorded with slider.kind = "interface"'
 
@@ -93,6 +87,7 @@ class Fronts:
     sound_velocity: float
     """c [m/s]; NaN for a single block."""
     blocks: int
+    notes: tuple[str, ...] = ()
 
     @property
     def statistics(self) -> dict[str, dict[str, float]]:
@@ -174,17 +169,10 @@ class Fronts:
     def rows(self, group: str) -> list[dict[str, Any]]:
         """A dictionary for each front or event; None for unknown values, kinds as words."""
         columns = self.fronts if group == "fronts" else self.events
-        lists = [
-            [WORDS[name][value] for value in values.tolist()] if name in WORDS else values.tolist()
-            for name, values in columns.items()
-        ]
-        return [
-            {
-                name: None if value != value else value
-                for name, value in zip(columns, row, strict=True)
-            }
-            for row in zip(*lists, strict=True)
-        ]
+        words = {
+            name: np.array(WORDS[name])[columns[name]] for name in WORDS.keys() & columns.keys()
+        }
+        return rows_of({**columns, **words})
 
     def to_json(self) -> dict[str, Any]:
         """Everything as nested lists and numbers."""
@@ -207,12 +195,8 @@ class Fronts:
 
     def write_csv(self, path: Path) -> None:
         """Write fronts and events as two tables, with an empty line between them."""
-        with written_whole(path) as part, part.open("w", newline="", encoding="utf-8") as file:
-            for place, (group, meanings) in enumerate((("fronts", ALL_FRONTS), ("events", EVENTS))):
-                file.write("\n" if place else "")
-                writer = csv.DictWriter(file, list(meanings))
-                writer.writerow({name: f"{name} [{one.units}]" for name, one in meanings.items()})
-                writer.writerows(self.rows(group))
+        groups = (("fronts", ALL_FRONTS), ("events", EVENTS))
+        write_tables([(self.rows(name), one.units()) for name, one in groups], path)
 
 
 def _table(
@@ -280,10 +264,7 @@ def _events(
         for start, end in zip(np.append(0, ends[:-1]), ends, strict=True)
         if end > start
     ]
-    found = {
-        name: np.array([one.get(name, np.nan) for one in rows], dtype=meaning.dtype)
-        for name, meaning in EVENTS.items()
-    }
+    found = EVENTS.columns(rows)
     found["spring_force"][:] = _spring_forces(tree, found)
     return found
 
@@ -350,7 +331,7 @@ def residual_of(tree: Tree, realization: int | None = None) -> float:
     return float(ratios.mean()) if ratios.size else float("nan")
 
 
-def fronts(output: OutputLike) -> xr.DataTree:
+def fronts(output: OutputLike) -> DataTree:
     """The fronts of detachment of an interface with a length, and the events that they are in.
 
     Ruptures of neighbouring blocks whose slips overlap are one event: a precursor, or whole if it
@@ -380,25 +361,16 @@ def fronts(output: OutputLike) -> xr.DataTree:
 
     with opened_run_arrays(output) as tree:
         found = fronts_of(tree)
-    result = xr.DataTree.from_dict(dict(_datasets(found)))
+    groups = {
+        "fronts": ALL_FRONTS.dataset(("front",), found.fronts),
+        "events": EVENTS.dataset(("event_row",), found.events),
+    }
+    result = xr.DataTree.from_dict(groups)
     result.attrs |= {"sound_velocity": found.sound_velocity, "blocks": found.blocks}
     return result
 
 
-def _datasets(found: Fronts) -> Iterator[tuple[str, xr.Dataset]]:
-    import xarray as xr
-
-    for group, meanings, dimension, columns in (
-        ("fronts", ALL_FRONTS, "front", found.fronts),
-        ("events", EVENTS, "event_row", found.events),
-    ):
-        variables = {
-            name: meanings.variable(name, (dimension,), columns[name]) for name in meanings
-        }
-        yield group, xr.Dataset(variables)
-
-
-def fronts_from(tree: xr.DataTree) -> Fronts:
+def fronts_from(tree: DataTree) -> Fronts:
     """The fronts that `fronts` returned."""
     columns = [
         {str(name): one.values for name, one in tree[group].data_vars.items()}

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from mesoslip.array_types import Array, DataTree
 from mesoslip.configuration import arguments
 from mesoslip.errors import ConfigError, Problem, RunError
 from mesoslip.execution.executors import ExecutorLike, as_executor, completed
@@ -30,11 +31,8 @@ from mesoslip.simulation.realization import Realization
 from mesoslip.simulation.recorded_tables import TRACE_COLUMNS
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from mesoslip.configuration.config import Config
 
-Array = NDArray[np.float64]
 
 # Kinds of sliders with inertia and a spring, whose drive can be displaced.
 SLIDERS = ("rigid", "layered")
@@ -182,7 +180,7 @@ def lyapunov(
     displacement: float = DISPLACEMENT,
     executor: ExecutorLike = None,
     progress: Callable[[float], None] | None = None,
-) -> xr.DataTree:
+) -> DataTree:
     """The largest Lyapunov exponent of the motion that a configuration settles to.
 
     Parameters
@@ -285,7 +283,7 @@ def lyapunov(
     )
 
 
-def summary(tree: xr.DataTree) -> str:
+def summary(tree: DataTree) -> str:
     """Meaning of the sign of the largest exponent."""
     exponent, error = (float(tree[name]) for name in ("lyapunov_exponent", "lyapunov_error"))
     if not math.isfinite(error):

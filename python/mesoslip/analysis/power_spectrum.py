@@ -6,9 +6,8 @@ Importing `scipy.signal` takes longer than the analysis of a trace of 100 000 sa
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from mesoslip.array_types import Array
 
 
 def power_spectrum(values: Array, interval: float, length: int) -> tuple[Array, Array]:

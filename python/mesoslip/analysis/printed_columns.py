@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip.output.table_files import PrintedTable
+from mesoslip.output.variables import with_force_unit
 from mesoslip.quantities import column
 
 # Significant digits of columns without errors, and of times.
@@ -21,12 +22,12 @@ def printed_columns(
     title: str,
     columns: Mapping[str, NDArray[Any]],
     heads: Mapping[str, tuple[str, str]],
-    unit_of: Callable[[str], str],
+    force_unit: str,
 ) -> PrintedTable:
     """A table of the columns with a header and an SI unit; those without numbers are left out.
 
-    ``unit_of`` replaces a unit, as in records of friction coefficients. The realization is a column
-    where there are several.
+    The force unit is "1" in records of friction coefficients. The realization is a column where
+    there are several.
     """
     cells = []
     if columns["realization_index"].any():
@@ -40,7 +41,7 @@ def printed_columns(
             cells.append((head, *(f"{one:{sign}.0f}" for one in values)))
             continue
         digits = TIME_DIGITS if name == "start_time" else DIGITS
-        shown = column(values.tolist(), unit_of(unit), digits)
+        shown = column(values.tolist(), with_force_unit(unit, force_unit), digits)
         errors = columns.get(f"{name}_error", np.full(values.size, np.nan))
         sizes = np.abs(values[np.isfinite(values) & (values != 0)])
         if f"{name}_error" not in columns and not name.endswith("_time") and sizes.size:

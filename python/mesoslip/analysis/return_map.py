@@ -3,17 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mesoslip.array_types import Array, DataTree
 from mesoslip.output.access import group_of
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-Array = NDArray[np.float64]
 
 # Part of a run before the first peak of the map.
 TRANSIENT = 0.5
@@ -21,7 +15,7 @@ TRANSIENT = 0.5
 NEIGHBOURS, MAX_PART = 8, 0.1
 
 
-def settled_peaks(tree: xr.DataTree, realization: int = 0) -> Array:
+def settled_peaks(tree: DataTree, realization: int = 0) -> Array:
     """Spring force at the start of each slip of the second half of a run [N]."""
     if "slips" not in tree.children:
         return np.empty(0)

@@ -6,23 +6,21 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mesoslip.analysis.apparatus import Apparatus, apparatus_of, with_force_unit
+from mesoslip.analysis.apparatus import Apparatus, apparatus_of
 from mesoslip.analysis.stick_phases import stick_phases
-from mesoslip.output import table_files
+from mesoslip.array_types import Dataset
 from mesoslip.output.access import group_of
 from mesoslip.output.arrays import Arrays, Tree
 from mesoslip.output.inputs import OutputLike, as_run
-from mesoslip.output.table_files import PrintedTable
+from mesoslip.output.table_files import PrintedTable, rows_of, write_table
+from mesoslip.output.variables import with_force_unit
 from mesoslip.quantities import Column as PrintedColumn
 from mesoslip.quantities import column, number
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 # Columns that are not in the group of an output: CF units for a force in newtons, and meaning.
 ADDED = {
@@ -69,15 +67,12 @@ HEADS = {
 STATISTICS_ONLY = {*STICK_COLUMNS} - {"creep_share"}
 # Significant digits of the largest number of a column, and of standard deviations.
 DIGITS, DEVIATION_DIGITS = 5, 2
-# Units of forces where the trace is a friction coefficient.
-COEFFICIENT_UNITS = {"N": "1", "N/s": "1/s", "N/m": "1/m"}
 
 
 def as_recorded(head: str, unit: str, force_unit: str) -> tuple[str, str]:
     """Head and unit of a column of forces, or of friction coefficients if the force unit is "1"."""
-    if force_unit != "1":
-        return head, unit
-    return head.replace("force", "friction"), COEFFICIENT_UNITS.get(unit, unit)
+    head = head.replace("force", "friction") if force_unit == "1" else head
+    return head, with_force_unit(unit, force_unit)
 
 
 class Column(NamedTuple):
@@ -98,14 +93,7 @@ class Catalogue:
     @property
     def rows(self) -> list[dict[str, Any]]:
         """A dictionary for each slip; None for unknown values."""
-        columns = [self.columns[name].values.tolist() for name in COLUMNS]
-        return [
-            {
-                name: None if value != value else value
-                for name, value in zip(COLUMNS, row, strict=True)
-            }
-            for row in zip(*columns, strict=True)
-        ]
+        return rows_of({name: self.columns[name].values for name in COLUMNS})
 
     @property
     def statistics(self) -> dict[str, dict[str, float]]:
@@ -129,9 +117,12 @@ class Catalogue:
 
     def write_csv(self, path: Path) -> None:
         """Write the catalogue as a table with the units in its header."""
-        table_files.write_table(
-            self.rows, {name: self.columns[name].unit for name in COLUMNS}, path
-        )
+        write_table(self.rows, {name: self.columns[name].unit for name in COLUMNS}, path)
+
+    @property
+    def tables(self) -> list[PrintedTable]:
+        """The slips for print."""
+        return [self.printed()]
 
     def printed(self) -> PrintedTable:
         """The slips as a table for print, a row for each, each column in one unit."""
@@ -209,20 +200,20 @@ def catalogue_of(tree: Tree, realization: int | None = None) -> Catalogue:
     )
 
 
-def catalogue_from(data: xr.Dataset) -> Catalogue:
+def catalogue_from(data: Dataset) -> Catalogue:
     """The catalogue that `slips` returned."""
     columns = {name: _column(data, name) for name in COLUMNS}
     return Catalogue(columns, columns["force_drop"].unit)
 
 
-def _column(data: xr.Dataset | Arrays, name: str) -> Column:
+def _column(data: Dataset | Arrays, name: str) -> Column:
     attributes = data[name].attrs
     return Column(
         data[name].values, attributes.get("units", "1"), attributes.get("long_name", name)
     )
 
 
-def slips(output: OutputLike) -> xr.Dataset:
+def slips(output: OutputLike) -> Dataset:
     """The catalogue of slips of an output, dimension ``slip``, in SI.
 
     Returns
@@ -258,7 +249,7 @@ def slips(output: OutputLike) -> xr.Dataset:
 
 
 def _stick_columns(
-    tree: Tree, data: xr.Dataset | Arrays, apparatus: Apparatus
+    tree: Tree, data: Dataset | Arrays, apparatus: Apparatus
 ) -> dict[str, NDArray[np.float64]]:
     """The columns `STICK_COLUMNS`, NaN where they are unknown."""
     root = tree.to_dataset()
@@ -308,14 +299,9 @@ def counts(tree: Tree) -> dict[str, Any] | None:
         return None
     data = group_of(tree, "slip_counts")
     plateau = data.attrs.get("plateau")
+    names = ("min_fall", "slip_count", "mirrored_count")
     return {
-        "min_fall": data["min_fall"].values.tolist(),
-        "slip_count": data["slip_count"].values.tolist(),
-        **(
-            {"mirrored_count": data["mirrored_count"].values.tolist()}
-            if "mirrored_count" in data
-            else {}
-        ),
+        **{name: data[name].values.tolist() for name in names if name in data},
         "used": float(data.attrs["used"]),
         "plateau": None if plateau is None else [float(one) for one in plateau],
     }

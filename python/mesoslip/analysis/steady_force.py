@@ -10,9 +10,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from mesoslip.array_types import Array
 
 # Samples of a batch in the marginal standard error rule, and maximum length of a transient over
 # that of the series.
@@ -28,6 +27,8 @@ MIN_BLOCKS = 6
 MAX_DRIFT = 3.0
 # Minimum drift over the mean: a record without noise relaxes forever.
 MIN_DRIFT = 1e-4
+# Half the width of a 95 % interval over the standard error.
+NORMAL_95 = 1.96
 # Deviations over the mean that are rounding errors.
 ROUNDING = 1e-9
 
@@ -162,3 +163,13 @@ def _error_of_blocks(steady: Array, block: int) -> float:
     # An incomplete block is discarded at the start, next to the transient.
     means = steady[:, steady.shape[1] - count * block :].reshape(-1, block).mean(axis=1)
     return float(means.std(ddof=1) / math.sqrt(means.size))
+
+
+def error_of_mean(values: Array, steady: SteadyMean) -> float:
+    """Standard error of the mean over realizations; the noise of the force for one realization."""
+    return scatter(values) if values.size > 1 else steady.standard_deviation
+
+
+def scatter(values: Array) -> float:
+    """Standard error of the mean over realizations; NaN for one realization."""
+    return float(values.std(ddof=1) / math.sqrt(values.size)) if values.size > 1 else math.nan

@@ -16,9 +16,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from mesoslip.array_types import Array
 
 # Part of a stick phase in which the loading is measured, after the rebound and before creep, its
 # minimum length over that of the phase, and minimum number of samples in it.

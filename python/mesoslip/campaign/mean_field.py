@@ -18,14 +18,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from mesoslip.array_types import Array
 from mesoslip.configuration import arguments
 from mesoslip.configuration.config import Config
 from mesoslip.errors import ConfigError, FileError, Problem, RunError
 from mesoslip.output.inputs import ConfigLike, as_config
 from mesoslip.output.targets import written_whole
 from mesoslip.simulation.realization import Realization
-
-Array = NDArray[np.float64]
 
 # Displacement of the slider over the mean breaking stretch: until sliding is steady, and in all.
 SETTLED, LENGTH = 4.0, 10.0

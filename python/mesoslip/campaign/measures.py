@@ -11,30 +11,25 @@ import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mesoslip.analysis.fronts import FRONT_TYPES, first_front
 from mesoslip.analysis.lyapunov import lyapunov
 from mesoslip.analysis.regime import NAMES, REGIME, regimes
 from mesoslip.analysis.return_map import map_exponent as exponent_of_map
+from mesoslip.array_types import Array, DataTree
 from mesoslip.campaign import predictions
 from mesoslip.output.access import config_of
 from mesoslip.output.variables import LYAPUNOV
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class RunView:
     """A run of one realization, and the time from which it is measured [s]."""
 
-    tree: xr.DataTree
+    tree: DataTree
     start: float
 
     def trace(self, name: str) -> Array:
@@ -56,7 +51,7 @@ class RunView:
         return first_front(self.tree) if "fronts" in self.tree.children else {}
 
     @cached_property
-    def exponent(self) -> xr.DataTree:
+    def exponent(self) -> DataTree:
         """Its largest Lyapunov exponent, from twins of another run of the configuration."""
         number = int(self.tree.to_dataset()["realization"].values[0])
         return lyapunov(config_of(self.tree), realization=number, executor=1)
@@ -71,8 +66,7 @@ class RunView:
             return np.empty(0)
         rows = self.tree.children[group].to_dataset()
         wanted = rows["start_time"].values >= self.start
-        values: Array = rows[name].values[wanted].astype(np.float64)
-        return values
+        return rows[name].values[wanted].astype(np.float64)
 
 
 Function = Callable[[RunView], float]

@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mesoslip.array_types import DataTree
 from mesoslip.configuration.config import Config
 from mesoslip.errors import ConfigError, RunError
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from mesoslip.theory.linear_stability import LinearStability
     from mesoslip.theory.steady_front import SteadyFront
 
@@ -23,25 +22,25 @@ CURVE_LENGTH = 3.0
 MAX_WORK = 10**6
 
 
-def _configuration(tree: xr.DataTree) -> Config:
+def _configuration(tree: DataTree) -> Config:
     """The configuration of a run, the same for all realizations."""
     return Config.from_toml(tree.attrs["configuration"]).replace("run.seed=1")
 
 
-def _steady_sliding(tree: xr.DataTree) -> LinearStability | None:
+def _steady_sliding(tree: DataTree) -> LinearStability | None:
     # SciPy, which it imports, is not needed by most sweeps.
     from mesoslip.theory.steady_sliding import steady_sliding
 
     return steady_sliding(_configuration(tree), MAX_WORK)
 
 
-def growth_rate(tree: xr.DataTree) -> float:
+def growth_rate(tree: DataTree) -> float:
     """Growth rate of small perturbations of steady sliding, with delay [1/s]."""
     sliding = _steady_sliding(tree)
     return math.nan if sliding is None else sliding.growth_rate
 
 
-def stable_dephased(tree: xr.DataTree) -> float:
+def stable_dephased(tree: DataTree) -> float:
     """Whether steady sliding is stable, 1 or 0, of dephased contacts too."""
     sliding = _steady_sliding(tree)
     try:
@@ -50,12 +49,12 @@ def stable_dephased(tree: xr.DataTree) -> float:
         return math.nan
 
 
-def critical_stiffness_ratio(tree: xr.DataTree) -> float:
+def critical_stiffness_ratio(tree: DataTree) -> float:
     """K* of the master equation over the stiffness of the spring."""
     return _critical_stiffness_ratio(_configuration(tree))
 
 
-def waiting_over_damping(tree: xr.DataTree) -> float:
+def waiting_over_damping(tree: DataTree) -> float:
     """Mean time between slips times the damping rate of the setup."""
     from mesoslip.analysis.slips import slips
 
@@ -87,13 +86,13 @@ def _critical_stiffness(config: Config) -> float:
     return ForceCurve(config).K_star[0]
 
 
-def front_prestress(tree: xr.DataTree) -> float:
+def front_prestress(tree: DataTree) -> float:
     """Stress over strength of the blocks far from the edge as the first one breaks."""
     front = _steady_front(tree)
     return math.nan if front is None else front.prestress
 
 
-def steady_front_speed_ratio(tree: xr.DataTree) -> float:
+def steady_front_speed_ratio(tree: DataTree) -> float:
     """Speed of a steady front under that prestress, over that of sound."""
     front = _steady_front(tree)
     if front is None:
@@ -101,7 +100,7 @@ def steady_front_speed_ratio(tree: xr.DataTree) -> float:
     return float(front.speed(front.prestress)) / front.sound_velocity
 
 
-def _steady_front(tree: xr.DataTree) -> SteadyFront | None:
+def _steady_front(tree: DataTree) -> SteadyFront | None:
     from mesoslip.theory.steady_front import SteadyFront
 
     try:

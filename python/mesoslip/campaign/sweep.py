@@ -5,17 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing, nullcontext
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from mesoslip.array_types import Dataset
 from mesoslip.campaign.combination import Combination, described
-from mesoslip.campaign.point import (
-    FORMAT,
-    Outcome,
-    Task,
-    chain_keys,
-    compute,
-    point_name,
-)
+from mesoslip.campaign.point import FORMAT, Outcome, Task, chain_keys, compute, point_name
 from mesoslip.campaign.sweep_dataset import SweepDataset
 from mesoslip.campaign.sweep_plan import Plan, as_plan
 from mesoslip.configuration import arguments
@@ -33,9 +27,6 @@ from mesoslip.execution.program import program
 from mesoslip.execution.stop import Stop, StopRequest
 from mesoslip.execution.store import Pieces, Store
 
-if TYPE_CHECKING:
-    import xarray as xr
-
 # Ending of a sweep that was stopped.
 INTERRUPTED = "interrupted"
 # Maximum time to wait for a user's measure that ignores a stop [s].
@@ -49,7 +40,7 @@ class Sweep:
     Points were in the store, or computed, or are missing; then `ending` says why it ended early.
     """
 
-    dataset: xr.Dataset
+    dataset: Dataset
     failures: dict[str, str]
     stored: int
     computed: int
@@ -261,7 +252,7 @@ def sweep(
     store: PathLike | None = None,
     executor: ExecutorLike = None,
     progress: Callable[[float], None] | None = None,
-) -> xr.Dataset:
+) -> Dataset:
     """Run a configuration over a range of parameters, and measure each run.
 
     Parameters

@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mesoslip.array_types import Dataset
 from mesoslip.configuration.keys import key_kind
 from mesoslip.execution.program import program
 from mesoslip.output.provenance import program_attributes
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from mesoslip.campaign.combination import Combination
     from mesoslip.campaign.sweep_plan import Plan
 
@@ -46,7 +45,7 @@ class SweepDataset:
         """Mark a point that failed."""
         self._status[(*combination.index, realization)] = FAILED
 
-    def dataset(self, ending: str, failures: Mapping[str, str]) -> xr.Dataset:
+    def dataset(self, ending: str, failures: Mapping[str, str]) -> Dataset:
         """The dataset as it is now: ``status`` and the measures, NaN where points are missing.
 
         It has a dimension for each swept key, named like it, with its values in SI; one for keys

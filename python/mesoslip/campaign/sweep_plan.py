@@ -15,13 +15,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from mesoslip.campaign.chain import (
-    DIRECTION,
-    chain_problems,
-    chained,
-    unchained,
-    with_directions,
-)
+from mesoslip.campaign.chain import DIRECTION, chain_problems, chained, unchained, with_directions
 from mesoslip.campaign.combination import Combination, described
 from mesoslip.campaign.sweep_axes import axes_of
 from mesoslip.campaign.sweep_table import MAX_POINTS, SweepFile

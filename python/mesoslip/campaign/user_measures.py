@@ -7,15 +7,13 @@ from collections.abc import Callable, Sequence
 from functools import cache
 from numbers import Real
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from mesoslip.array_types import DataTree
 from mesoslip.campaign.measures import MEASURES, Measure, RunView
 from mesoslip.errors import ConfigError, Problem, RunError
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 # Names that the dataset of a sweep uses itself.
 RESERVED = {"status", "realization", "sample", "direction"}
@@ -79,7 +77,7 @@ def measure_of(name: str, source: str = "", path: str = "") -> Measure:
 
 
 @cache
-def _user_function(source: str, path: str, entry: str) -> Callable[[xr.DataTree], Any]:
+def _user_function(source: str, path: str, entry: str) -> Callable[[DataTree], Any]:
     """A function of a user's file, which is run once in each process.
 
     A `RunError` says where the file raised, or which function it may be that is missing.

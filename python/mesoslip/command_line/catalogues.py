@@ -1,21 +1,26 @@
-"""``mesoslip slips``, ``mesoslip avalanches`` and ``mesoslip regime``."""
+"""Commands that print what is found in an output: slips, avalanches, events, strokes, plateaus."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated, Any, TypeVar
+from functools import partial
+from typing import Annotated, Any, Literal, TypeVar
 
 import typer
 
 from mesoslip.command_line.options import (
     JsonOption,
+    LatexOption,
     OutputArgument,
     TableOption,
     counted,
+    positive_or_none,
     print_json,
     print_table,
+    share,
     show,
     show_all,
+    show_catalogue,
     time_of,
     write_table,
 )
@@ -41,8 +46,7 @@ def slips(
     from mesoslip.analysis import slips as catalogues
     from mesoslip.output import files, targets
 
-    if table is not None:
-        targets.check_writable(table, [output])
+    targets.check_writable(table, [output])
     with files.opened_arrays(output) as tree:
         catalogue, counts = catalogues.catalogue_of(tree), catalogues.counts(tree)
     for_print = catalogue.printed()
@@ -113,8 +117,7 @@ def avalanches(
     from mesoslip.analysis.avalanche_sizes import ccdf, logarithmic_bins
     from mesoslip.output import files, targets
 
-    if table is not None:
-        targets.check_writable(table, [output])
+    targets.check_writable(table, [output])
     tree = files.read_run(output)
     start = time_of(after, "--after")
     data = avalanche_catalogue.avalanches(tree, after=start, min_force_ratio=min_force_ratio)
@@ -185,3 +188,141 @@ def regime(output: OutputArgument, as_json: JsonOption = False) -> None:
         typer.echo(one.summary)
     if len(results) > 1:
         typer.echo(summary(results))
+
+
+def fronts(
+    output: OutputArgument,
+    table: TableOption = None,
+    as_json: JsonOption = False,
+    as_latex: Annotated[
+        bool, typer.Option("--latex", help="Print the statistics by kind as a LaTeX table")
+    ] = False,
+) -> None:
+    """Print fronts and precursors of an interface with a length."""
+    from mesoslip.analysis.fronts import fronts_of
+
+    find = partial(fronts_of, name=str(output))
+    found = show_catalogue(output, find, table, as_json=as_json, as_latex=as_latex)
+    sentence = None if as_json or as_latex else found.size_sentence()
+    if sentence is not None:
+        typer.echo(f"\n{sentence}")
+
+
+def events(
+    output: OutputArgument,
+    table: TableOption = None,
+    as_json: JsonOption = False,
+    as_latex: LatexOption = False,
+    catalogue: Annotated[
+        str | None,
+        typer.Option(
+            "--of",
+            help="Catalogue: slips, avalanches, or channel, the last of these by default",
+            metavar="CATALOGUE",
+        ),
+    ] = None,
+    threshold: Annotated[
+        float | None,
+        typer.Option(
+            min=0,
+            help="Minimum amplitude of an event of the channel; from its noise by default",
+            metavar="NUMBER",
+        ),
+    ] = None,
+    completeness: Annotated[
+        float | None,
+        typer.Option(help="Minimum log10(size) of the b-value; found by default", metavar="NUMBER"),
+    ] = None,
+    main_size: Annotated[
+        float | None,
+        typer.Option(
+            min=0, help="Minimum size of main events; the largest 5 % by default", metavar="SIZE"
+        ),
+    ] = None,
+) -> None:
+    """Print b-value and Omori decay of events, and acoustic emission.
+
+    Acoustic emission is compared with the slips of a trace.
+    """
+    from mesoslip.analysis import events as analysis
+    from mesoslip.configuration.arguments import check_choice
+
+    check_choice("--of", catalogue, analysis.CATALOGUES)
+    find = partial(
+        analysis.events_of,
+        catalogue=catalogue,
+        threshold=threshold,
+        completeness=completeness,
+        main_size=main_size,
+        name=str(output),
+    )
+    show_catalogue(output, find, table, as_json=as_json, as_latex=as_latex)
+
+
+def plateaus(
+    output: OutputArgument,
+    table: TableOption = None,
+    as_json: JsonOption = False,
+    as_latex: LatexOption = False,
+    signal: Annotated[
+        str | None,
+        typer.Option(
+            help="Signal whose steps cut the record: speed, load or force; by default speed and "
+            "load where they have steps",
+            metavar="SIGNAL",
+        ),
+    ] = None,
+    viscosity: Annotated[
+        str | None,
+        typer.Option(
+            help="Viscosity of the lubricant, such as '90 mPa*s', for a Stribeck curve",
+            metavar="VISCOSITY",
+        ),
+    ] = None,
+) -> None:
+    """Print the friction of each plateau of a record.
+
+    Plateaus lie between steps of speed, load or force.
+    """
+    from mesoslip.analysis import plateaus as analysis
+    from mesoslip.configuration.arguments import check_choice
+
+    check_choice("--signal", signal, analysis.SIGNALS)
+    lubricant = positive_or_none(viscosity, "--viscosity", "Pa*s", "90 mPa*s")
+    find = partial(analysis.plateaus_of, signal=signal, viscosity=lubricant, name=str(output))
+    show_catalogue(output, find, table, as_json=as_json, as_latex=as_latex)
+
+
+def strokes(
+    output: OutputArgument,
+    table: TableOption = None,
+    as_json: JsonOption = False,
+    as_latex: Annotated[
+        bool, typer.Option("--latex", help="Print the means over cycles as a LaTeX table")
+    ] = False,
+    middle: Annotated[
+        str,
+        typer.Option(
+            help="Share of a stroke over which friction is averaged, in its middle",
+            metavar="SHARE",
+        ),
+    ] = "80%",
+    period: Annotated[
+        str | None,
+        typer.Option(
+            help="Time of a revolution of a disc, such as '0.92 s', or auto", metavar="TIME"
+        ),
+    ] = None,
+) -> None:
+    """Print strokes, cycles and revolutions of a reciprocating record.
+
+    The record goes back and forth, or is that of a disc.
+    """
+    from mesoslip.analysis import strokes as analysis
+
+    part = share(middle, "--middle")
+    time: float | Literal["auto"] | None = "auto"
+    if period != "auto":
+        time = positive_or_none(period, "--period", "s", "0.92 s")
+    find = partial(analysis.strokes_of, middle=part, name=str(output), period=time)
+    show_catalogue(output, find, table, as_json=as_json, as_latex=as_latex, latex_table=-1)

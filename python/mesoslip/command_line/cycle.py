@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from mesoslip.array_types import Dataset
 from mesoslip.command_line.options import (
     ConfigArgument,
     JsonOption,
@@ -25,8 +26,6 @@ from mesoslip.command_line.options import (
 from mesoslip.command_line.progress import progress_shown
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from mesoslip.configuration.config import Config
     from mesoslip.cycles.cycle_result import Cycle
 
@@ -72,8 +71,7 @@ def cycle(
     from mesoslip.output import targets, writing
 
     checked = load(config, changes)
-    if output is not None:
-        targets.check_output(output, [config, *([] if start is None else [start])])
+    targets.check_output(output, [config, *([] if start is None else [start])])
     print_caveat(checked)
     if continued is not None:
         _follow(checked, continued, start, output, as_json=as_json, quiet=quiet)
@@ -141,7 +139,7 @@ def _values(text: str) -> tuple[str, list[float]]:
     return key, np.geomspace(low, high, int(parts[2])).tolist()
 
 
-def _print_branches(data: xr.Dataset, key: str) -> None:
+def _print_branches(data: Dataset, key: str) -> None:
     """Print a line for each value: motion and amplitude, up and down."""
     from mesoslip.configuration.units import from_cf_units
     from mesoslip.quantities import with_unit

@@ -8,21 +8,19 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from mesoslip.array_types import DataTree
 from mesoslip.command_line.options import (
     JsonOption,
     QuietOption,
     SetOption,
+    interruptible,
     output_option,
     print_json,
     print_table,
     workers_option,
 )
-from mesoslip.command_line.progress import progress_shown, say
-from mesoslip.execution.stop import StoppedError, stopped_by_signals
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from mesoslip.inference.posterior import Row
 
 HEAD = (
@@ -99,7 +97,7 @@ def _fitted(
     workers: int | None,
     *,
     quiet: bool,
-) -> xr.DataTree:
+) -> DataTree:
     """Fit traces, and write the posterior."""
     from mesoslip.execution.store import Store
     from mesoslip.inference.fit_trace import as_plan
@@ -110,15 +108,8 @@ def _fitted(
     store = path.with_name(f"{path.stem}.simulations")
     trees = [files.read_run(one) for one in traces]
     plan = as_plan(config, trees, changes)
-    with stopped_by_signals() as stop:
-        try:
-            with progress_shown(quiet) as progress:
-                tree = fit_traces(
-                    traces, plan, store=store, executor=workers, progress=progress, stop=stop
-                )
-        except StoppedError:
-            say(f"{path}: interrupted; the same command continues from {store}")
-            raise typer.Exit(stop.exit_status) from None
+    with interruptible(path, quiet, f"; the same command continues from {store}") as work:
+        tree = fit_traces(traces, plan, store=store, executor=workers, **work._asdict())
     writing.write(tree, path)
     Store(store, "simulations").remove()
     return tree
@@ -139,20 +130,9 @@ def _predict(
     from mesoslip.output import targets, writing
 
     targets.check_output(path, [posterior, trace])
-    with stopped_by_signals() as stop:
-        try:
-            with progress_shown(quiet) as progress:
-                tree = predict(
-                    posterior,
-                    trace,
-                    **({} if predictions is None else {"predictions": predictions}),
-                    executor=workers,
-                    progress=progress,
-                    stop=stop,
-                )
-        except StoppedError:
-            say(f"{path}: interrupted")
-            raise typer.Exit(stop.exit_status) from None
+    count: dict[str, Any] = {} if predictions is None else {"predictions": predictions}
+    with interruptible(path, quiet) as work:
+        tree = predict(posterior, trace, **count, executor=workers, **work._asdict())
     writing.write(tree, path)
     probability = tree.attrs["agreement_probability"]
     if as_json:
@@ -187,7 +167,7 @@ def _print_scores(posteriors: Sequence[Path], *, as_json: bool) -> None:
     print_table(cells)
 
 
-def _print(tree: xr.DataTree, *, as_json: bool) -> None:
+def _print(tree: DataTree, *, as_json: bool) -> None:
     """Print the table of a fit, its notes and its warnings."""
     from mesoslip.inference.posterior import table
 
@@ -217,7 +197,7 @@ def _print(tree: xr.DataTree, *, as_json: bool) -> None:
     _print_remarks(tree)
 
 
-def _remarks(tree: xr.DataTree) -> dict[str, list[str]]:
+def _remarks(tree: DataTree) -> dict[str, list[str]]:
     """Warnings and notes, a sentence each."""
     return {
         name: [one for one in str(tree.attrs[name]).split("\n") if one]
@@ -225,7 +205,7 @@ def _remarks(tree: xr.DataTree) -> dict[str, list[str]]:
     }
 
 
-def _print_remarks(tree: xr.DataTree) -> None:
+def _print_remarks(tree: DataTree) -> None:
     remarks = _remarks(tree)
     for one in remarks["notes"]:
         typer.echo(one)

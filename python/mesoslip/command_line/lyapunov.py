@@ -14,8 +14,8 @@ from mesoslip.command_line.options import (
     SetOption,
     load,
     output_option,
+    positive_or_none,
     print_json,
-    quantity_or_none,
     show_all,
 )
 from mesoslip.command_line.progress import progress_shown
@@ -42,9 +42,8 @@ def lyapunov(
     from mesoslip.output import targets, writing
 
     checked = load(config, changes)
-    if output is not None:
-        targets.check_output(output, [config])
-    duration = quantity_or_none(follow, "--follow", "s", "2 s", positive=True)
+    targets.check_output(output, [config])
+    duration = positive_or_none(follow, "--follow", "s", "2 s")
     with progress_shown(quiet) as progress:
         tree = lyapunov(
             checked, twins=twins, duration=duration, executor=workers, progress=progress

@@ -4,16 +4,43 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, Protocol, TypeVar
 
 import typer
 
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
     from mesoslip.execution.executors import ExecutorLike
+    from mesoslip.execution.stop import Stop
+    from mesoslip.output.arrays import Tree
     from mesoslip.output.table_files import PrintedTable
+
+
+class Catalogue(Protocol):
+    """What is found in an output: tables for print, and notes on them."""
+
+    @property
+    def tables(self) -> Sequence[PrintedTable]: ...
+
+    @property
+    def notes(self) -> Sequence[str]: ...
+
+    def write_csv(self, path: Path) -> None: ...
+
+    def to_json(self) -> dict[str, Any]: ...
+
+
+Found = TypeVar("Found", bound=Catalogue)
+
+
+class Work(NamedTuple):
+    """Work that reports its progress, and that a signal stops."""
+
+    progress: Callable[[float], None]
+    stop: Stop
 
 
 def output_option(help_text: str, metavar: str = "OUT.nc") -> typer.models.OptionInfo:
@@ -96,12 +123,11 @@ def executor_of(
     workers: int | None, scheduler: str | None = None, pool: str | None = None
 ) -> ExecutorLike:
     """The executor that options name; without them the default of the command."""
-    from mesoslip.errors import ConfigError, Problem
+    from mesoslip.configuration.arguments import check_choice
     from mesoslip.execution.executors import Dask, Processes, Threads, ThreadsThenProcesses
 
     pools = {"threads": Threads, "processes": Processes, "both": ThreadsThenProcesses}
-    if pool is not None and pool not in pools:
-        raise ConfigError([Problem("", "--pool", f"must be one of {', '.join(pools)}", pool)])
+    check_choice("--pool", pool, pools)
     if scheduler is not None:
         return Dask(scheduler)
     return workers if pool is None else pools[pool](workers)
@@ -173,6 +199,51 @@ def write_table(
         write_csv(file)
 
 
+def show_catalogue(
+    output: Path,
+    find: Callable[[Tree], Found],
+    table: Path | None,
+    *,
+    as_json: bool,
+    as_latex: bool,
+    latex_table: int = 0,
+) -> Found:
+    """Print what is found in an output, and write it to the file of a `TableOption`."""
+    from mesoslip.output import files, targets
+    from mesoslip.output.table_files import latex
+
+    targets.check_writable(table, [output])
+    with files.opened_arrays(output) as tree:
+        found = find(tree)
+    write_table(table, lambda: found.tables, found.write_csv)
+    if as_json:
+        print_json(found.to_json())
+    elif as_latex:
+        typer.echo(latex(found.tables[latex_table]))
+    else:
+        for note in found.notes:
+            typer.echo(note)
+        print_tables(found.tables)
+    return found
+
+
+@contextmanager
+def interruptible(
+    path: Path, quiet: bool, hint: str = "", what: str = "simulating"
+) -> Iterator[Work]:
+    """Work on a file that a signal stops, with a message and the exit status of the signal."""
+    from mesoslip.command_line.progress import progress_shown, say
+    from mesoslip.execution.stop import StoppedError, stopped_by_signals
+
+    with stopped_by_signals() as stop:
+        try:
+            with progress_shown(quiet, what) as progress:
+                yield Work(progress, stop)
+        except StoppedError:
+            say(f"{path}: interrupted{hint}")
+            raise typer.Exit(stop.exit_status) from None
+
+
 def counted(count: float, noun: str) -> str:
     """A number of things: "1 slip", "2 slips"."""
     return f"{count:.0f} {noun}{'s' if count != 1 else ''}"
@@ -203,11 +274,12 @@ def quantity(
     negative: bool = True,
 ) -> float:
     """The value of an option that is a quantity, in SI."""
-    from mesoslip.configuration.units import to_si
+    from mesoslip.configuration.units import is_number, to_si
     from mesoslip.errors import ConfigError, Problem
 
     try:
-        value = to_si(_number_or_text(text), unit, example)
+        # A plain number is in SI.
+        value = to_si(float(text) if is_number(text) else text, unit, example)
     except ValueError as error:
         raise ConfigError([Problem("", option, str(error), text)]) from None
     if positive and value <= 0:
@@ -217,21 +289,9 @@ def quantity(
     return value
 
 
-def _number_or_text(text: str) -> float | str:
-    """A plain number, which is in SI; or a string with a unit."""
-    from mesoslip.configuration.units import number_of
-
-    try:
-        return number_of(text)
-    except ValueError:
-        return text
-
-
-def quantity_or_none(
-    text: str | None, option: str, unit: str, example: str, *, positive: bool = False
-) -> float | None:
-    """The value of an option that is a quantity, in SI; None without it."""
-    return None if text is None else quantity(text, option, unit, example, positive=positive)
+def positive_or_none(text: str | None, option: str, unit: str, example: str) -> float | None:
+    """The value of an option that is a quantity above 0, in SI; None without it."""
+    return None if text is None else quantity(text, option, unit, example, positive=True)
 
 
 def share(text: str, option: str) -> float:

@@ -1,23 +1,65 @@
-"""``mesoslip plot``."""
+"""``mesoslip plot``, and what its views show."""
 
 from __future__ import annotations
 
+import ast
 import math
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 import typer
 from typer.core import TyperCommand, TyperOption
 
 from mesoslip.array_packages import hidden
-from mesoslip.command_line.options import (
-    OutputsArgument,
-    output_option,
-    time_of,
-)
+from mesoslip.command_line.options import OutputsArgument, output_option, time_of
 from mesoslip.command_line.progress import progress_shown
 from mesoslip.command_line.quick_matplotlib import import_matplotlib
+
+FOLDER = Path(__file__).parents[1] / "plots" / "views"
+# How a view begins in its file.
+START = "\nVIEW = View("
+
+
+class Summary(NamedTuple):
+    """Name, kind and summary of a view."""
+
+    name: str
+    kind: str
+    summary: str
+
+
+def summaries() -> list[Summary]:
+    """Those of all views, in the order of their files."""
+    found = []
+    for path in sorted(FOLDER.glob("*.py")):
+        _, start, rest = path.read_text(encoding="utf-8").partition(START)
+        if start:
+            call = ast.parse(start + rest).body[0].value  # type: ignore[attr-defined]
+            values = {one.arg: one.value for one in call.keywords}
+            found.append(Summary(*(ast.literal_eval(values[one]) for one in Summary._fields)))
+    return found
+
+
+def summary_of_views() -> str:
+    """The views of each kind of output that has several, with what they show; read from files,
+    since importing them takes a second."""
+    from mesoslip.output.kinds import KINDS
+
+    kinds, views = [], summaries()
+    for kind, (description, _) in KINDS.items():
+        # The default view first.
+        names = {one.name for one in views if one.kind == kind}
+        texts = [
+            f"{name} ({'; '.join(one.summary for one in views if one.name == name)})"
+            for name in sorted(names, key=lambda name: (name != kind, name))
+        ]
+        if kind == "sweep":
+            kinds.append(f"Of {description}: the name of a measure.")
+        elif len(names) > 1:
+            kinds.append(f"Of {description}: {', '.join(texts)}.")
+    return " ".join(kinds)
+
 
 # Endings of pictures and movies.
 MOVIES = (".gif", ".mp4")
@@ -30,8 +72,6 @@ class PlotCommand(TyperCommand):
 
     def complete_help(self) -> None:
         """Add the views to the help of ``--view``."""
-        from mesoslip.command_line.view_summaries import summary_of_views
-
         for option in self.params:
             if isinstance(option, TyperOption) and option.name == "view":
                 option.help = f"{VIEW_HELP}. {summary_of_views()}"

@@ -1,4 +1,4 @@
-"""``mesoslip report``."""
+"""``mesoslip report`` and ``mesoslip export``."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from mesoslip.command_line.options import OutputsArgument, output_option
+from mesoslip.command_line.options import OutputArgument, OutputsArgument, output_option
 from mesoslip.command_line.quick_matplotlib import import_matplotlib
 
 
@@ -31,3 +31,19 @@ def report(
         targets.check_writable(path, there)
     reports.report(outputs, path)
     typer.echo(str(path), err=True)
+
+
+def export(
+    output: OutputArgument,
+    file: Annotated[
+        Path,
+        output_option(
+            "Folder NAME.zarr for the whole output, or NAME.xml for slips as QuakeML", "FILE"
+        ),
+    ],
+) -> None:
+    """Write an output as Zarr, or its slips as QuakeML."""
+    from mesoslip.analysis.export import export as write
+
+    write(output, file)
+    typer.echo(str(file), err=True)

@@ -4,26 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
+from mesoslip.array_types import DataTree
 from mesoslip.command_line.options import (
     JsonOption,
     QuietOption,
     TableOption,
+    interruptible,
     output_option,
+    positive_or_none,
     print_json,
     print_table,
-    quantity_or_none,
     write_table,
 )
-from mesoslip.command_line.progress import progress_shown, say
 from mesoslip.errors import ConfigError, FileError, Problem
-from mesoslip.execution.stop import StoppedError, stopped_by_signals
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 
 def response(
@@ -92,9 +89,8 @@ def response(
     from mesoslip.output import targets
     from mesoslip.output.table_files import latex, markdown
 
-    scale = quantity_or_none(normal_force, "--normal-force", "N", "10 mN", positive=True)
-    if table is not None:
-        targets.check_writable(table, outputs)
+    scale = positive_or_none(normal_force, "--normal-force", "N", "10 mN")
+    targets.check_writable(table, outputs)
     own = {"--output": output, "--law": law, "--samples": samples, "--seed": seed}
     others = {"--normal-force": normal_force, "--no-fit": None if fit else True}
     _check_options(others if posterior else own, posterior=posterior)
@@ -137,7 +133,7 @@ def _check_options(refused: Mapping[str, object], *, posterior: bool) -> None:
         raise ConfigError(problems)
 
 
-def _sampled(outputs: Sequence[Path], path: Path, quiet: bool, **options: Any) -> xr.DataTree:
+def _sampled(outputs: Sequence[Path], path: Path, quiet: bool, **options: Any) -> DataTree:
     """The posterior of an output, also written to a file."""
     from mesoslip.inference.rate_tree import response_posterior
     from mesoslip.output import targets, writing
@@ -145,19 +141,14 @@ def _sampled(outputs: Sequence[Path], path: Path, quiet: bool, **options: Any) -
     if len(outputs) > 1:
         raise FileError("--posterior is for one output at a time")
     targets.check_output(path, outputs)
-    with stopped_by_signals() as stop:
-        try:
-            with progress_shown(quiet, "sampling") as progress:
-                tree = response_posterior(outputs[0], progress=progress, stop=stop, **options)
-        except StoppedError:
-            say(f"{path}: interrupted")
-            raise typer.Exit(stop.exit_status) from None
+    with interruptible(path, quiet, what="sampling") as work:
+        tree = response_posterior(outputs[0], **work._asdict(), **options)
     writing.write(tree, path)
     return tree
 
 
 def _print_posterior(
-    tree: xr.DataTree, table: Path | None, as_json: bool, as_latex: bool, as_markdown: bool
+    tree: DataTree, table: Path | None, as_json: bool, as_latex: bool, as_markdown: bool
 ) -> None:
     """Print the table of a posterior, assessments of the laws, and warnings."""
     from mesoslip.inference.rate_tree import rate_table, remarks, rows_of_posterior, write_csv

@@ -97,8 +97,7 @@ def curve(
     from mesoslip.theory.steady_sliding import steady_sliding
 
     checked = load(config, changes)
-    if output is not None:
-        targets.check_output(output, [config])
+    targets.check_output(output, [config])
     print_caveat(checked)
     is_over_velocity = contact_theory(checked).depends_on_velocity
     if output is not None or is_over_velocity:
@@ -151,8 +150,7 @@ def onset(
     from mesoslip.theory import slip_onset
 
     checked = load(config, changes)
-    if output is not None:
-        targets.check_output(output, [config])
+    targets.check_output(output, [config])
     print_caveat(checked)
     tree = slip_onset.onset(checked)
     if output is not None:

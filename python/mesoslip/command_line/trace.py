@@ -5,16 +5,14 @@ from __future__ import annotations
 import math
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
+from mesoslip.array_types import DataTree
 from mesoslip.command_line.options import SavedOption, counted, workers_option
 from mesoslip.command_line.progress import progress_shown, say, steps_shown
 from mesoslip.errors import ConfigError, Problem
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 # Maximum number of files whose errors are printed.
 MAX_REPORTED = 5
@@ -220,7 +218,7 @@ def _read_each(
     return int(stop.exit_status if stop.is_set() else bool(failed))
 
 
-def _summary(tree: xr.DataTree) -> list[str]:
+def _summary(tree: DataTree) -> list[str]:
     """A short description of an output."""
     from mesoslip.quantities import with_unit
 

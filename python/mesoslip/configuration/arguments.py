@@ -100,6 +100,12 @@ def instance(kind: type[T] | tuple[type[T], ...], wanted: str) -> Callable[[Any]
     return check
 
 
+def check_choice(key: str, value: str | None, choices: Iterable[str]) -> None:
+    """Check that a value is None or one of some choices."""
+    if value is not None and value not in choices:
+        raise ConfigError([Problem("", key, f"must be one of {', '.join(choices)}", value)])
+
+
 def function(value: Any) -> Any:
     """A function."""
     if not callable(value) or isinstance(value, type):

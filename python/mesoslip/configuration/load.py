@@ -17,13 +17,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, field_validator, model_validator
 
-from mesoslip.configuration.columns import (
-    HEADER,
-    FoundColumn,
-    Quantity,
-    cells_of,
-    values_of,
-)
+from mesoslip.array_types import Array
+from mesoslip.configuration.columns import HEADER, FoundColumn, Quantity, cells_of, values_of
 from mesoslip.configuration.history import MAX_PARTS, History
 from mesoslip.configuration.kernel_parameters import Parameters
 from mesoslip.configuration.reading import text_of
@@ -41,8 +36,6 @@ from mesoslip.configuration.table import (
 )
 from mesoslip.errors import FileError
 from mesoslip.quantities import with_unit
-
-Array = NDArray[np.float64]
 
 # Column of a profile along an interface.
 PROFILE_COLUMN = "normal_force"
@@ -294,8 +287,7 @@ class Load(Table):
         times = np.asarray(time, dtype=float)
         if self.cycle is not None:
             angle = 2 * math.pi * self.cycle.frequency * times + self.cycle.phase
-            wave: Array = self.normal_force + self.cycle.amplitude * np.sin(angle)
-            return wave
+            return self.normal_force + self.cycle.amplitude * np.sin(angle)
         if not self.parts:
             return np.full_like(times, self.normal_force)
         durations, first, last = (np.array(one) for one in zip(*self.parts, strict=True))

@@ -75,6 +75,15 @@ def number_of(text: str, decimal: str = ".") -> float:
     raise ValueError(f"{shown(text)}, is not a number{_with_comma(text, decimal)}")
 
 
+def is_number(text: str) -> bool:
+    """Whether a text is a number, without a unit."""
+    try:
+        number_of(text)
+    except ValueError:
+        return False
+    return True
+
+
 def _with_comma(text: str, decimal: str) -> str:
     """A hint for a number with a comma."""
     if decimal == "," and "." in text:

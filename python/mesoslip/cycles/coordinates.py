@@ -14,9 +14,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.linalg import solveh_banded
 
+from mesoslip.array_types import Array
 from mesoslip.cycles.section import mass_of
 from mesoslip.simulation.archive import Archive
-from mesoslip.simulation.kernel import Array, Words
+from mesoslip.simulation.kernel import Words
 from mesoslip.simulation.start import drive_displacement
 
 if TYPE_CHECKING:

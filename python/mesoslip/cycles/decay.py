@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from mesoslip.array_types import Array
+
 if TYPE_CHECKING:
     from mesoslip.cycles.section import Passage
-    from mesoslip.simulation.kernel import Array
 
 # First pause over the time of loading, and maximum number of batches.
 BATCH_LOADINGS, MAX_BATCHES = 5.0, 7

@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from mesoslip.array_types import Array
 from mesoslip.simulation.archive import Archive, entries
-from mesoslip.simulation.kernel import Array, Kernel, Words
+from mesoslip.simulation.kernel import Kernel, Words
 from mesoslip.simulation.kernel_setup import NEVER, KernelSetup
 from mesoslip.simulation.recorded_tables import SLIP_COLUMNS, TRACE_COLUMNS, structured
 

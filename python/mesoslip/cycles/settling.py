@@ -14,11 +14,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mesoslip.array_types import Array
 from mesoslip.cycles.coordinates import Coordinates
 from mesoslip.cycles.decay import Amplitudes
 from mesoslip.cycles.section import Level, Motion, Passage, Trace, time_of
 from mesoslip.errors import RunError
-from mesoslip.simulation.kernel import Array, Words
+from mesoslip.simulation.kernel import Words
 
 # Maximum number of passages in a settled cycle.
 MAX_MULTIPLE = 4

@@ -42,11 +42,6 @@ class Folder:
         self._lock: int | None = None
 
     @property
-    def is_locked(self) -> bool:
-        """Whether this process may write to it."""
-        return self._lock is not None
-
-    @property
     def is_own(self) -> bool:
         """Whether this program has made it, or it is empty."""
         try:

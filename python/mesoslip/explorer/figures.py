@@ -27,7 +27,8 @@ THIS = "this run"
 FIRST, CONTACT = "#1f3b6f", "#8a8f98"
 OVER = {MEASURED: "#777777", LIMIT: "#c2571a", PINNED: "#c98a00"}
 # Room for the numbers of an axis, so that axes below each other have the same length [px].
-LEFT, RIGHT = 64, 12
+ROOM: dict[str, Any] = {"min_border_left": 64, "min_border_right": 12}
+TOOLS = "pan,wheel_zoom,box_zoom,reset,save"
 
 
 def set_changed(model: Any, **properties: Any) -> None:
@@ -35,6 +36,15 @@ def set_changed(model: Any, **properties: Any) -> None:
     for name, value in properties.items():
         if getattr(model, name) != value:
             setattr(model, name, value)
+
+
+def empty_figure(name: str, tools: str = TOOLS, **style: Any) -> Any:
+    """A figure as wide as the page."""
+    made = figure(name=name, sizing_mode="stretch_width", tools=tools, **style)
+    made.toolbar.logo = None
+    made.toolbar.autohide = True
+    made.axis.axis_label_text_font_style = "normal"
+    return made
 
 
 class Plot:
@@ -50,20 +60,10 @@ class Plot:
         **style: Any,
     ) -> None:
         self._elements, self._name = elements, name
-        self.figure = figure(
-            name=name,
-            title=title,
-            height=height,
-            min_border_left=LEFT,
-            min_border_right=RIGHT,
-            sizing_mode="stretch_width",
-            tools="pan,wheel_zoom,box_zoom,reset,save",
-            active_drag="box_zoom",
-            **style,
+        style = ROOM | style
+        self.figure = empty_figure(
+            name, title=title, height=height, active_drag="box_zoom", **style
         )
-        self.figure.toolbar.logo = None
-        self.figure.toolbar.autohide = True
-        self.figure.axis.axis_label_text_font_style = "normal"
         # Numbers of contacts are written out.
         self.figure.yaxis.formatter = BasicTickFormatter(power_limit_high=6)
         self.sources = {}
@@ -128,20 +128,14 @@ class InterfaceView:
         )
         self._ruptures = ColumnDataSource({"x": [], "y": []}, name="interface:ruptures")
         self._range = Range1d(start=0, end=1)
-        picture = figure(
-            name="interface",
+        picture = empty_figure(
+            "interface",
             title="Stress over strength along the interface; dots: blocks break",
             height=240,
-            min_border_left=LEFT,
-            min_border_right=RIGHT,
-            sizing_mode="stretch_width",
-            tools="pan,wheel_zoom,box_zoom,reset,save",
             x_range=x_range,
             y_range=self._range,
+            **ROOM,
         )
-        picture.toolbar.logo = None
-        picture.toolbar.autohide = True
-        picture.axis.axis_label_text_font_style = "normal"
         mapper = LinearColorMapper(palette="Cividis256", low=0, high=1)
         look: dict[str, Any] = {"color_mapper": mapper}
         picture.image(source=self._stress, **look)
@@ -283,16 +277,8 @@ class LatticeView:
             {"image": [], "x": [], "y": [], "dw": [], "dh": []}, name="lattice:image"
         )
         mapper = LinearColorMapper(palette="Viridis256", low=0, high=1, nan_color="#bbbbbb")
-        picture = figure(
-            name="lattice",
-            height=360,
-            max_width=420,
-            sizing_mode="stretch_width",
-            match_aspect=True,
-            tools="pan,wheel_zoom,reset,save",
-        )
-        picture.toolbar.logo = None
-        picture.toolbar.autohide = True
+        tools = "pan,wheel_zoom,reset,save"
+        picture = empty_figure("lattice", tools, height=360, max_width=420, match_aspect=True)
         picture.axis.visible = False
         picture.grid.visible = False
         # On any background of the page.

@@ -6,13 +6,13 @@ import math
 from collections import OrderedDict
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip.analysis.regime import IRREGULAR, STICK_SLIP, TRANSIENT, regimes, results_of
 from mesoslip.analysis.slips import catalogue_of
+from mesoslip.array_types import Array, DataTree
 from mesoslip.configuration.config import Config
 from mesoslip.errors import FileError, MesoslipError
 from mesoslip.output.access import config_of, group_of
@@ -30,11 +30,6 @@ from mesoslip.theory.contacts import contact_theory
 from mesoslip.theory.force_curve import ForceCurve
 from mesoslip.theory.steady_sliding import steady_sliding
 
-if TYPE_CHECKING:
-    import xarray as xr
-
-Array = NDArray[np.float64]
-
 # Parts of a line, in each of which the extremes are drawn.
 PARTS = 500
 # Minimum part of the time axis that a running simulation fills.
@@ -47,7 +42,7 @@ CURVE_TOLERANCE = 1e-6
 # Force of a measured trace, and means over slips that are compared with it, with their units.
 MEASURED_FORCE = "spring_force"
 COMPARED = {"force_drop": "N", "duration": "s", "waiting_time": "s"}
-# Relative change of a velocity that is none.
+# Relative change up to which a velocity is constant.
 CONSTANT = 1e-9
 # Maximum work for the stability of steady sliding.
 MAX_WORK = 10_000
@@ -257,7 +252,7 @@ def motion(results: Results, measured: Measured | None = None) -> Motion:
     )
 
 
-def _loop(tree: xr.DataTree, extent: Extent, force: Line) -> Line:
+def _loop(tree: DataTree, extent: Extent, force: Line) -> Line:
     directions = {one for part in config_of(tree).drive_parts for one in part.directions}
     if len(directions) < 2 or force.is_empty:
         return NOTHING
@@ -266,7 +261,7 @@ def _loop(tree: xr.DataTree, extent: Extent, force: Line) -> Line:
     return Line(x / across.size, y / force.up.unit.size, Axis("displacement", across), force.up)
 
 
-def _verdict(results: Results, tree: xr.DataTree) -> tuple[str, bool]:
+def _verdict(results: Results, tree: DataTree) -> tuple[str, bool]:
     """The regime in words, and whether it is final. The beginning of a run shows slips, but not
     that there are none."""
     config, found = results.config, results_of(regimes(tree))[0]
@@ -289,7 +284,7 @@ def _extremes(drawn: Line) -> list[tuple[str, str]]:
 
 
 def _forces(
-    tree: xr.DataTree, measured: Measured | None, extent: Extent, end: float, along: Scale
+    tree: DataTree, measured: Measured | None, extent: Extent, end: float, along: Scale
 ) -> tuple[Line, Line]:
     """The spring force of a run, and that of a measured trace, in one unit."""
     name = force_of(tree)
@@ -308,13 +303,13 @@ def _forces(
     return (lines[0] if lines else NOTHING), beside
 
 
-def _name(tree: xr.DataTree) -> str:
+def _name(tree: DataTree) -> str:
     """Name of the force that shows the motion: without a spring, that of the drive."""
     is_rigid = math.isinf(config_of(tree).spring_stiffness)
     return "driving force" if is_rigid else NAMES[force_of(tree)]
 
 
-def _comparison(tree: xr.DataTree, measured: Measured) -> list[tuple[str, str]]:
+def _comparison(tree: DataTree, measured: Measured) -> list[tuple[str, str]]:
     """Means over the slips of a run, and of a measured trace."""
     means = catalogue_of(tree).statistics
     found = []
@@ -340,7 +335,7 @@ def _progress(results: Results) -> str:
 
 
 def _line(
-    tree: xr.DataTree,
+    tree: DataTree,
     name: str,
     extent: Extent,
     window: tuple[float, float],
@@ -356,7 +351,7 @@ def _line(
     )
 
 
-def _close_up(tree: xr.DataTree) -> tuple[Line, Line]:
+def _close_up(tree: DataTree) -> tuple[Line, Line]:
     """Spring force and contact force of the largest slip, if there is a slip."""
     slip = largest_slip(tree)
     if slip is None:
@@ -386,7 +381,7 @@ def _largest(values: Array) -> float:
     return float(np.max(np.abs(values[np.isfinite(values)]), initial=0.0))
 
 
-def _lattice(tree: xr.DataTree, along: Scale) -> Lattice | None:
+def _lattice(tree: DataTree, along: Scale) -> Lattice | None:
     if "snapshots" not in tree.children:
         return None
     data = group_of(tree, "snapshots")
@@ -402,7 +397,7 @@ def _lattice(tree: xr.DataTree, along: Scale) -> Lattice | None:
     return Lattice(times, times / along.size, loads, largest[:-1])
 
 
-def _interface(tree: xr.DataTree, along: Scale, reached: float) -> Interface | None:
+def _interface(tree: DataTree, along: Scale, reached: float) -> Interface | None:
     if "blocks" not in tree.children or not reached:
         return None
     config = config_of(tree)

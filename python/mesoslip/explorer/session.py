@@ -7,6 +7,7 @@ import time
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from mesoslip.configuration.arguments import check_choice
 from mesoslip.configuration.config import Config
 from mesoslip.configuration.contacts.tables.interaction import LATTICES
 from mesoslip.configuration.differences import text_of
@@ -209,9 +210,7 @@ class Session:
     def _switch(self, control: Control, text: str) -> None:
         """Give a table the keys of a choice, or omit it."""
         table, needed = control.key, control.required
-        if text not in control.choices:
-            choices = ", ".join(control.choices)
-            raise ConfigError([Problem("", table, f"must be one of {choices}", text)])
+        check_choice(table, text, control.choices)
         every = {one for keys in needed.values() for one in keys}
         for one in (*every, table):
             if one not in self._needed_by_others(table):

@@ -23,13 +23,12 @@ def read_stages(text: str) -> str:
     """Stages in words as the value of ``drive.stage`` on the command line."""
     stages = [_stage(one.strip()) for one in text.split(";") if one.strip()]
     tables = (
-        ", ".join(f"{name} = {_toml(value)}" for name, value in stage.items()) for stage in stages
+        ", ".join(
+            f"{name} = {json.dumps(value, ensure_ascii=False)}" for name, value in stage.items()
+        )
+        for stage in stages
     )
     return f"[{', '.join(f'{{ {one} }}' for one in tables)}]"
-
-
-def _toml(value: str | bool) -> str:
-    return json.dumps(value, ensure_ascii=False)
 
 
 def _stage(text: str) -> dict[str, str | bool]:

@@ -5,17 +5,14 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
+from mesoslip.array_types import DataTree
 from mesoslip.configuration.config import Config
 from mesoslip.configuration.keys import key_kind
 from mesoslip.configuration.units import to_si
 from mesoslip.errors import ConfigError, FileError, Problem
 from mesoslip.inference.fit_plan import Plan
 from mesoslip.quantities import with_unit
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 # The keys of an apparatus. Other keys of a simulated trace are not compared: a measured trace does
 # not have them.
@@ -44,7 +41,7 @@ class Apparatus:
         }
 
 
-def declared_values(tree: xr.DataTree) -> dict[str, float]:
+def declared_values(tree: DataTree) -> dict[str, float]:
     """The values of `KEYS` that a trace declares, in SI."""
     tables = tomllib.loads(tree.attrs["configuration"])
     found = {}

@@ -6,14 +6,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mesoslip.array_types import Array
 from mesoslip.inference.features import Feature
 from mesoslip.inference.likelihood import project
 from mesoslip.inference.misfit import sentences
 from mesoslip.inference.prior import Prior
-
-Array = NDArray[np.float64]
 
 # Probability below which the model is rejected.
 REJECTED = 0.02

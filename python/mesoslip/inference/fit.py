@@ -6,12 +6,12 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip.analysis.sampled_slips import FoundSlips
+from mesoslip.array_types import Array, DataTree
 from mesoslip.execution.executors import ExecutorLike
 from mesoslip.execution.stop import StopRequest
 from mesoslip.execution.store import Store
@@ -23,11 +23,6 @@ from mesoslip.inference.sampler import check_installed
 from mesoslip.inference.simulations import Simulations, Simulator
 from mesoslip.inference.traced_experiment import Experiment
 from mesoslip.inference.traced_experiment import prepare as prepare_experiment
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-Array = NDArray[np.float64]
 
 # Maximum number of stored samples of a predicted trace.
 MAX_SAMPLES = 3000
@@ -76,7 +71,7 @@ class FitResult:
 
 
 def fit(
-    trees: Sequence[xr.DataTree],
+    trees: Sequence[DataTree],
     names: Sequence[str],
     plan: Plan,
     *,
@@ -126,7 +121,7 @@ def fit(
     )
 
 
-def prepare(trees: Sequence[xr.DataTree], names: Sequence[str], plan: Plan) -> Simulator:
+def prepare(trees: Sequence[DataTree], names: Sequence[str], plan: Plan) -> Simulator:
     """The simulator of experiments, with their traces."""
     plan = plan.of_traces(len(trees))
     several = len(trees) > 1

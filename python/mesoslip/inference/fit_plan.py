@@ -11,14 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from mesoslip.configuration.config import Config
-from mesoslip.configuration.files import (
-    Change,
-    Merged,
-    on_base,
-    override,
-    read_toml,
-    undotted,
-)
+from mesoslip.configuration.files import Change, Merged, on_base, override, read_toml, undotted
 from mesoslip.configuration.keys import key_kind, nearest_keys
 from mesoslip.configuration.units import to_si
 from mesoslip.errors import ConfigError, Problem

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 import tomllib
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from mesoslip.analysis.even_traces import even_trace
 from mesoslip.analysis.noise import noise_level
 from mesoslip.analysis.sampled_slips import estimated_period
+from mesoslip.array_types import DataTree
 from mesoslip.configuration import arguments
 from mesoslip.configuration.files import Change
 from mesoslip.configuration.reading import PathLike, as_path
@@ -23,9 +24,6 @@ from mesoslip.inference.posterior import build_tree
 from mesoslip.inference.traced_experiment import MIN_SAMPLES
 from mesoslip.output.inputs import OutputLike, as_run, several, trace_name
 
-if TYPE_CHECKING:
-    import xarray as xr
-
 
 @arguments.checked(progress=arguments.function)
 def fit(
@@ -36,7 +34,7 @@ def fit(
     executor: ExecutorLike = None,
     progress: Callable[[float], None] | None = None,
     stop: StopRequest | None = None,
-) -> xr.DataTree:
+) -> DataTree:
     """Fit parameters of the model to a trace, or several of one interface, with their uncertainty.
 
     Parameters
@@ -92,7 +90,7 @@ def fit(
     return build_tree(fitted)
 
 
-def trace_names(outputs: Sequence[OutputLike], trees: Sequence[xr.DataTree]) -> list[str]:
+def trace_names(outputs: Sequence[OutputLike], trees: Sequence[DataTree]) -> list[str]:
     """Unique names of traces: those of their files, with numbers if necessary."""
     names = [trace_name(one, tree) for one, tree in zip(outputs, trees, strict=True)]
     if len(set(names)) == len(names):
@@ -102,7 +100,7 @@ def trace_names(outputs: Sequence[OutputLike], trees: Sequence[xr.DataTree]) -> 
 
 def as_plan(
     config: PathLike | Mapping[str, Any] | Plan,
-    trees: Sequence[xr.DataTree],
+    trees: Sequence[DataTree],
     changes: Iterable[Change] = (),
 ) -> Plan:
     """The plan of a fit from its file or from nested tables, completed from the traces."""
@@ -115,7 +113,7 @@ def as_plan(
     return plan.of_traces(len(trees))
 
 
-def known_of(trees: Sequence[xr.DataTree]) -> Known:
+def known_of(trees: Sequence[DataTree]) -> Known:
     """Properties of the apparatus according to the first trace."""
     tree = trees[0]
     traced = tomllib.loads(tree.attrs["configuration"])

@@ -6,13 +6,9 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
+from mesoslip.array_types import Array
 from mesoslip.configuration.config import Config
 from mesoslip.inference.prior import FILTER
-
-Array = NDArray[np.float64]
 
 # Keys of the contacts that are proportional to their number.
 EXTENSIVE = ("static_force", "stiffness", "area", "drag")

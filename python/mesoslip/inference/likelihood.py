@@ -23,7 +23,8 @@ from itertools import combinations_with_replacement
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from mesoslip.analysis.noise.levels import NORMAL_MEDIAN
+from mesoslip.array_types import Array
 
 # Maximum deviation of a summary, in spreads of the simulations.
 MAX_SCORE = 6.0
@@ -35,8 +36,6 @@ MAX_LEVERAGE = 1 - 1e-6
 SIMULATIONS_PER_TERM = 8
 # Degrees of freedom of t distributions; the normal one is a further candidate.
 FREEDOMS = (3.0, 4.0, 6.0, 9.0, 14.0, 25.0)
-# Median of the absolute value of a standard normal deviate.
-NORMAL_MEDIAN = 0.6744897501960817
 # Minimum number of simulations for a correction of the likelihood, their maximum deviation in
 # standard deviations, and minimum factor of the width.
 MIN_CORRECTION = 20
@@ -64,10 +63,7 @@ class Projection:
 
     def __call__(self, summaries: Array) -> Array:
         """Statistics, shape (..., parameters)."""
-        statistics: Array = (
-            _with_squares(self.scores(summaries), self.has_squares) @ self.weights + self.offset
-        )
-        return statistics
+        return _with_squares(self.scores(summaries), self.has_squares) @ self.weights + self.offset
 
 
 def _with_squares(scores: Array, has_squares: bool) -> Array:
@@ -171,8 +167,7 @@ class Surrogate:
 
     def mean(self, parameters: Array) -> Array:
         """Expected statistics, shape (..., statistics)."""
-        mean: Array = self._terms(parameters) @ self.coefficients
-        return mean
+        return self._terms(parameters) @ self.coefficients
 
     def _terms(self, parameters: Array) -> Array:
         return _terms((parameters - self.centre) / self.spread, self.powers)
@@ -337,11 +332,8 @@ def _tails(distance: Array, size: int) -> tuple[float, float]:
     from scipy.special import gammaln
 
     square = float(np.mean(distance)) / size
-    best = (
-        -0.5 * float(np.mean(distance)) / square - 0.5 * size * math.log(square) + _normal(size),
-        math.inf,
-        math.sqrt(square),
-    )
+    value = -0.5 * float(np.mean(distance)) / square - 0.5 * size * math.log(square)
+    best = (value - 0.5 * size * math.log(2 * math.pi), math.inf, math.sqrt(square))
     for freedom in FREEDOMS:
         square = float(np.median(distance)) / size
         for _ in range(100):
@@ -354,10 +346,6 @@ def _tails(distance: Array, size: int) -> tuple[float, float]:
         if value > best[0]:
             best = (value, freedom, math.sqrt(square))
     return best[1], best[2]
-
-
-def _normal(size: int) -> float:
-    return -0.5 * size * math.log(2 * math.pi)
 
 
 def _validity(

@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mesoslip.array_types import Array
 from mesoslip.inference.features import Feature
 from mesoslip.quantities import column
-
-Array = NDArray[np.float64]
 
 # Minimum deviation of a summary that is mentioned, in spreads of the predictions.
 MIN_SCORE = 2.0

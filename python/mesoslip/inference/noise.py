@@ -6,11 +6,9 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mesoslip.analysis.noise import estimate_noise, noise_level
-
-Array = NDArray[np.float64]
+from mesoslip.array_types import Array
 
 # Relative uncertainty of an estimated noise.
 UNCERTAINTY = 0.1

@@ -3,23 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip.analysis.sampled_slips import FoundSlips
+from mesoslip.array_types import Array, Dataset, DataTree
 from mesoslip.configuration.units import cf_units
 from mesoslip.inference import apparatus
-from mesoslip.inference.checks import (
-    DETERMINED,
-    UNDETERMINED,
-    needed_groups,
-    shrinkage,
-    warnings,
-)
+from mesoslip.inference.checks import DETERMINED, UNDETERMINED, needed_groups, shrinkage, warnings
 from mesoslip.inference.features import Feature
 from mesoslip.inference.fit import FitResult, Prediction
 from mesoslip.inference.prior import WANDER
@@ -27,11 +22,6 @@ from mesoslip.inference.sampler import r_hat
 from mesoslip.output.provenance import program_attributes
 from mesoslip.output.variables import SLIPS, Group, Meaning
 from mesoslip.quantities import with_unit
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-Array = NDArray[np.float64]
 
 # Numbers of each summary of a trace.
 SUMMARIES = Group(
@@ -48,6 +38,12 @@ SUMMARIES = Group(
 PERCENTILES: tuple[float, ...] = (5.0, 25.0, 50.0, 75.0, 95.0)
 VERDICTS = ("not determined", "narrowed", "determined")
 SLIP_COLUMNS = ("start_time", "end_time", "force_before", "force_after")
+# Meanings of columns of the table.
+MEANINGS = {
+    "declared": "value that the first trace declares, in SI",
+    "width": "standard deviation of the logarithm, of a normal prior",
+    "information": "fraction of the variance predicted by a group of summaries alone",
+}
 # Minimum significant digits of values in a table.
 MIN_DIGITS = 3
 
@@ -86,7 +82,7 @@ def interval_digits(low: float, high: float) -> int:
     return max(MIN_DIGITS, 2 + math.ceil(math.log10(size / (high - low))))
 
 
-def build_tree(fitted: FitResult) -> xr.DataTree:
+def build_tree(fitted: FitResult) -> DataTree:
     """A posterior as a tree.
 
     Groups ``posterior`` (dimensions chain, draw), ``prior``, ``observed_data``,
@@ -99,21 +95,9 @@ def build_tree(fitted: FitResult) -> xr.DataTree:
     plan, estimate = fitted.plan, fitted.estimate
     prior = plan.prior
     values = prior.values(estimate.chains)
-    chains = {"chain": np.arange(len(values)), "draw": np.arange(values.shape[1])}
-
-    def group(draws: Array, coordinates: dict[str, NDArray[np.int_]]) -> xr.Dataset:
-        return xr.Dataset(
-            {
-                one.key: (
-                    ("chain", "draw"),
-                    draws[..., index],
-                    {"units": cf_units(one.unit), "long_name": one.key},
-                )
-                for index, one in enumerate(prior.free)
-            },
-            coordinates,
-        )
-
+    attributes_of = {
+        one.key: {"units": cf_units(one.unit), "long_name": one.key} for one in prior.free
+    }
     rng = np.random.default_rng([plan.seed, 2])
     from_prior = prior.values(rng.random((1, 1000, len(prior))))
     needs = needed_groups(prior, fitted.information)
@@ -144,8 +128,8 @@ def build_tree(fitted: FitResult) -> xr.DataTree:
         attributes["filter_time"] = plan.filter_time
     groups = {
         "/": xr.Dataset(attrs=program_attributes(plan.config, "fit") | attributes),
-        "/posterior": group(values, chains),
-        "/prior": group(from_prior, {"chain": np.arange(1), "draw": np.arange(1000)}),
+        "/posterior": draws_group(values, attributes_of),
+        "/prior": draws_group(from_prior, attributes_of),
         "/summaries": summaries_group(
             fitted.simulator.features,
             fitted.observed,
@@ -160,12 +144,25 @@ def build_tree(fitted: FitResult) -> xr.DataTree:
     return xr.DataTree.from_dict(groups)
 
 
+def draws_group(values: Array, attributes: Mapping[str, Mapping[str, str]]) -> Dataset:
+    """Draws in SI, of shape (chains, draws, parameters), as variables with attributes by name."""
+    import xarray as xr
+
+    return xr.Dataset(
+        {
+            name: (("chain", "draw"), values[..., index], one)
+            for index, (name, one) in enumerate(attributes.items())
+        },
+        {"chain": np.arange(len(values)), "draw": np.arange(values.shape[1])},
+    )
+
+
 def suffix(number: int) -> str:
     """Suffix of the groups of a trace: none for the first one."""
     return f"_{number + 1}" if number else ""
 
 
-def trace_groups(prediction: Prediction, number: int) -> dict[str, xr.Dataset]:
+def trace_groups(prediction: Prediction, number: int) -> dict[str, Dataset]:
     """Groups of a trace and its predictions, by its number."""
     import xarray as xr
 
@@ -253,7 +250,7 @@ def _notes(fitted: FitResult) -> Iterator[str]:
         yield "the strength is taken to be the same along the track (fit.wander = false)"
 
 
-def _slips(found: Sequence[FoundSlips], start: float) -> xr.Dataset:
+def _slips(found: Sequence[FoundSlips], start: float) -> Dataset:
     import xarray as xr
 
     owner = np.repeat(np.arange(len(found)), [len(one) for one in found])
@@ -271,7 +268,7 @@ def summaries_group(
     predicted: Array,
     scores: Array,
     left_out: NDArray[np.bool_],
-) -> xr.Dataset:
+) -> Dataset:
     """The group `SUMMARIES` of traces and of their predictions.
 
     Predicted summaries have the shape (traces, summaries).
@@ -310,47 +307,36 @@ def summaries_group(
     )
 
 
-def _parameters(fitted: FitResult, needs: dict[str, tuple[str, ...]]) -> xr.Dataset:
+def _parameters(fitted: FitResult, needs: dict[str, tuple[str, ...]]) -> Dataset:
     import xarray as xr
 
     prior, draws = fitted.plan.prior, fitted.estimate.draws
     groups = list(fitted.information)
     declared = fitted.simulator.experiments[0].apparatus.declared
     percentiles = np.percentile(prior.values(draws), PERCENTILES, axis=0).T
-    return xr.Dataset(
-        {
-            "value": (("parameter", "percentile"), percentiles),
-            "units": ("parameter", [one.unit for one in prior.free]),
-            "follows_from": ("parameter", ["\n".join(needs[one.key]) for one in prior.free]),
-            "declared": (
-                "parameter",
-                [declared.get(one.key, math.nan) for one in prior.free],
-                {"long_name": "value that the first trace declares, in SI"},
-            ),
-            "width": (
-                "parameter",
-                [one.width for one in prior.free],
-                {"long_name": "standard deviation of the logarithm, of a normal prior"},
-            ),
-            "low": ("parameter", [one.low for one in prior.free]),
-            "high": ("parameter", [one.high for one in prior.free]),
-            "is_logarithmic": ("parameter", [int(one.is_logarithmic) for one in prior.free]),
-            "shrinkage": ("parameter", shrinkage(draws)),
-            "information": (
-                ("parameter", "feature_group"),
-                np.array([fitted.information[one] for one in groups]).T,
-                {"long_name": "fraction of the variance predicted by a group of summaries alone"},
-            ),
-        },
-        {
-            "parameter": list(prior.keys),
-            "percentile": list(PERCENTILES),
-            "feature_group": groups,
-        },
+    information = np.array([fitted.information[one] for one in groups]).T
+    columns = {
+        "units": [one.unit for one in prior.free],
+        "follows_from": ["\n".join(needs[one.key]) for one in prior.free],
+        "declared": [declared.get(one.key, math.nan) for one in prior.free],
+        "width": [one.width for one in prior.free],
+        "low": [one.low for one in prior.free],
+        "high": [one.high for one in prior.free],
+        "is_logarithmic": [int(one.is_logarithmic) for one in prior.free],
+        "shrinkage": shrinkage(draws),
+    }
+    found = xr.Dataset(
+        {"value": (("parameter", "percentile"), percentiles)}
+        | {name: ("parameter", one) for name, one in columns.items()}
+        | {"information": (("parameter", "feature_group"), information)},
+        {"parameter": list(prior.keys), "percentile": list(PERCENTILES), "feature_group": groups},
     )
+    for name, meaning in MEANINGS.items():
+        found[name].attrs["long_name"] = meaning
+    return found
 
 
-def table(tree: xr.DataTree) -> list[Row]:
+def table(tree: DataTree) -> list[Row]:
     """The table of a fit, a row for each parameter."""
     data = tree["parameters"].to_dataset()
     rows = []

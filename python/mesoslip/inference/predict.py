@@ -5,11 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mesoslip.array_types import Array, DataTree
 from mesoslip.configuration import arguments
 from mesoslip.configuration.config import Config
 from mesoslip.configuration.keys import key_kind
@@ -25,11 +24,6 @@ from mesoslip.inference.prior import LEVEL, WANDER, FreeParameter, Prior, level_
 from mesoslip.inference.simulations import Simulations, Simulator
 from mesoslip.inference.traced_experiment import prepare
 from mesoslip.output.inputs import OutputLike, as_run, open_output, trace_name
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-Array = NDArray[np.float64]
 
 # Number of predicted traces.
 PREDICTIONS = 60
@@ -59,7 +53,7 @@ def predict(
     executor: ExecutorLike = None,
     progress: Callable[[float], None] | None = None,
     stop: StopRequest | None = None,
-) -> xr.DataTree:
+) -> DataTree:
     """Predict a trace by the posterior of other traces of the same interface.
 
     Parameters
@@ -152,7 +146,7 @@ def predict(
     )
 
 
-def as_posterior(posterior: OutputLike) -> xr.DataTree:
+def as_posterior(posterior: OutputLike) -> DataTree:
     """A result of `fit`, open or from its file."""
     import xarray as xr
 
@@ -162,7 +156,7 @@ def as_posterior(posterior: OutputLike) -> xr.DataTree:
     return tree
 
 
-def prior_of(posterior: xr.DataTree) -> Prior:
+def prior_of(posterior: DataTree) -> Prior:
     """The free parameters of a fit."""
     data = posterior["parameters"].to_dataset()
     found = []
@@ -198,7 +192,7 @@ def _with_own_level(prior: Prior, points: Array, rng: np.random.Generator) -> tu
     )
 
 
-def _declared_in(posterior: xr.DataTree) -> dict[str, float]:
+def _declared_in(posterior: DataTree) -> dict[str, float]:
     """The values of free keys that the first trace of a fit declares."""
     data = posterior["parameters"].to_dataset()
     if "declared" not in data:

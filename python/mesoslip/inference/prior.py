@@ -8,9 +8,8 @@ from statistics import NormalDist
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from mesoslip.array_types import Array
 
 # Name of the amplitude of a slow variation of the strength along the track, relative to the maximum
 # force (`mesoslip.inference.wander`), and of the time constant of the load cell [s].

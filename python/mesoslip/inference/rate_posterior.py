@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mesoslip.analysis.rate_and_state import (
     Fit,
@@ -25,12 +24,11 @@ from mesoslip.analysis.rate_and_state import (
     fit_laws,
     preferred_law,
 )
+from mesoslip.array_types import Array
 from mesoslip.errors import FileError, RunError
 from mesoslip.execution.stop import StoppedError, StopRequest
 from mesoslip.inference.prior import FreeParameter, Prior
 from mesoslip.inference.sampler import check_installed, draw, step_count
-
-Array = NDArray[np.float64]
 
 # Names of the parameters of the noise.
 NOISE = ("noise", "noise_share", "noise_time")
@@ -107,15 +105,6 @@ def sample_laws(
     Without names of laws these are the laws of one state variable, and those of two whose
     parameters least squares determine, but for those that do not describe a record that others
     describe.
-
-    Raises
-    ------
-    FileError
-        If the record has no noise.
-    RunError
-        If the motion of no law can be integrated, or that of a named law.
-    StoppedError
-        If a stop is requested.
     """
     check_installed()
     if record.noise is not None and record.noise.deviation == 0:

@@ -6,32 +6,27 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mesoslip.analysis.apparatus import with_force_unit
 from mesoslip.analysis.experiment_stages import Experiment
 from mesoslip.analysis.rate_and_state import LAWS, assessment, records_of
+from mesoslip.array_types import Dataset, DataTree
 from mesoslip.configuration import arguments
 from mesoslip.configuration.units import cf_units, from_cf_units
 from mesoslip.errors import ConfigError, FileError, Problem
 from mesoslip.execution.stop import StopRequest
 from mesoslip.inference.checks import MAX_R_HAT, draw_warnings, shrinkage
-from mesoslip.inference.posterior import PERCENTILES, interval_digits, suffix
+from mesoslip.inference.posterior import PERCENTILES, draws_group, interval_digits, suffix
 from mesoslip.inference.prior import Prior
 from mesoslip.inference.rate_posterior import NOISE, RatePosterior, sample_laws
 from mesoslip.inference.sampler import r_hat
 from mesoslip.output.inputs import OutputLike, opened_run
 from mesoslip.output.provenance import program_attributes
 from mesoslip.output.table_files import PrintedTable, write_table
+from mesoslip.output.variables import with_force_unit
 from mesoslip.quantities import column, with_error, with_unit
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-Array = NDArray[np.float64]
 
 # Names of parameters in tables, and their meanings.
 NAMES = {
@@ -82,7 +77,7 @@ def response_posterior(
     free_stiffness: bool = False,
     progress: Callable[[float], None] | None = None,
     stop: StopRequest | None = None,
-) -> xr.DataTree:
+) -> DataTree:
     """The posterior of rate-and-state parameters and of the noise of an output. See
     ``docs/response.md``.
 
@@ -146,7 +141,7 @@ def response_posterior(
 
 def _build_tree(
     found: Sequence[RatePosterior], experiment: Experiment, limitation: str, seed: int
-) -> xr.DataTree:
+) -> DataTree:
     """Posteriors of the laws of one record as a tree."""
     import xarray as xr
 
@@ -183,11 +178,18 @@ def _build_tree(
     for number, one in enumerate(found):
         after, prior, values = suffix(number), one.prior, one.values
         law = {"law": one.fit.law.name, "verdict": one.fit.verdict}
+        attributes_of = {
+            each.key: {
+                "units": with_force_unit(cf_units(each.unit), unit),
+                "long_name": NAMES[each.key][1],
+            }
+            for each in prior.free
+        }
         from_prior = prior.values(rng.random((1, PRIOR_DRAWS, len(prior))))
         predicted = one.predicted(min(PREDICTIONS, len(one.draws)), rng)
         groups |= {
-            f"/posterior{after}": _draws(prior, values, unit, law),
-            f"/prior{after}": _draws(prior, from_prior, unit, law),
+            f"/posterior{after}": draws_group(values, attributes_of).assign_attrs(law),
+            f"/prior{after}": draws_group(from_prior, attributes_of).assign_attrs(law),
             f"/posterior_predictive{after}": xr.Dataset(
                 {force_name: (("chain", "draw", "time"), predicted[None], force)},
                 {"chain": [0], "draw": np.arange(len(predicted)), "time": time},
@@ -233,28 +235,7 @@ def _warnings(one: RatePosterior) -> list[str]:
     return found
 
 
-def _draws(prior: Prior, values: Array, unit: str, attributes: dict[str, str]) -> xr.Dataset:
-    """Draws in SI, of shape (chains, draws, parameters), as variables."""
-    import xarray as xr
-
-    return xr.Dataset(
-        {
-            one.key: (
-                ("chain", "draw"),
-                values[..., index],
-                {
-                    "units": with_force_unit(cf_units(one.unit), unit),
-                    "long_name": NAMES[one.key][1],
-                },
-            )
-            for index, one in enumerate(prior.free)
-        },
-        {"chain": np.arange(len(values)), "draw": np.arange(values.shape[1])},
-        attributes,
-    )
-
-
-def _parameters(one: RatePosterior, unit: str) -> xr.Dataset:
+def _parameters(one: RatePosterior, unit: str) -> Dataset:
     """The table of a law: its parameters, with a - b after those of the states, and the noise."""
     import xarray as xr
 
@@ -272,47 +253,32 @@ def _parameters(one: RatePosterior, unit: str) -> xr.Dataset:
     def of_prior(attribute: str) -> list[float]:
         return [float(getattr(known.get(name), attribute, math.nan)) for name in names]
 
+    percentiles = [np.percentile(columns.get(name, rate), PERCENTILES) for name in names]
+    units = [known[name].unit if name in known else "N" for name in names]
+    table = {
+        "units": [with_force_unit(cf_units(one), unit) for one in units],
+        "least_squares": [noise[name] if name in noise else fit.value(name) for name in names],
+        "least_squares_error": [math.nan if name in noise else fit.error(name) for name in names],
+        "low": of_prior("low"),
+        "high": of_prior("high"),
+        "is_logarithmic": [int(name in known and known[name].is_logarithmic) for name in names],
+        "shrinkage": [shrunk.get(name, math.nan) for name in names],
+        "r_hat": [rhat.get(name, math.nan) for name in names],
+    }
     return xr.Dataset(
-        {
-            "value": (
-                ("parameter", "percentile"),
-                [np.percentile(columns.get(name, rate), PERCENTILES) for name in names],
-            ),
-            "units": (
-                "parameter",
-                [
-                    with_force_unit(cf_units(known[name].unit if name in known else "N"), unit)
-                    for name in names
-                ],
-            ),
-            "least_squares": (
-                "parameter",
-                [noise[name] if name in noise else fit.value(name) for name in names],
-            ),
-            "least_squares_error": (
-                "parameter",
-                [math.nan if name in noise else fit.error(name) for name in names],
-            ),
-            "low": ("parameter", of_prior("low")),
-            "high": ("parameter", of_prior("high")),
-            "is_logarithmic": (
-                "parameter",
-                [int(name in known and known[name].is_logarithmic) for name in names],
-            ),
-            "shrinkage": ("parameter", [shrunk.get(name, math.nan) for name in names]),
-            "r_hat": ("parameter", [rhat.get(name, math.nan) for name in names]),
-        },
+        {"value": (("parameter", "percentile"), percentiles)}
+        | {name: ("parameter", one) for name, one in table.items()},
         {"parameter": names, "percentile": list(PERCENTILES)},
     )
 
 
-def law_groups(tree: xr.DataTree) -> list[xr.Dataset]:
+def law_groups(tree: DataTree) -> list[Dataset]:
     """The groups ``parameters`` of a posterior, one for each law."""
     count = len(str(tree.attrs["laws"]).split("\n"))
     return [tree[f"parameters{suffix(number)}"].to_dataset() for number in range(count)]
 
 
-def rows_of_posterior(tree: xr.DataTree) -> list[dict[str, Any]]:
+def rows_of_posterior(tree: DataTree) -> list[dict[str, Any]]:
     """The table of a posterior in SI, a row for each parameter of each law."""
     rows = []
     for data in law_groups(tree):
@@ -338,7 +304,7 @@ def rows_of_posterior(tree: xr.DataTree) -> list[dict[str, Any]]:
     return rows
 
 
-def rate_table(tree: xr.DataTree) -> PrintedTable:
+def rate_table(tree: DataTree) -> PrintedTable:
     """The table of a posterior; each line says whether its law describes the record."""
     head = ("law", "parameter", "least squares", "median", "90 % interval", "prior", "verdict")
     rows = tuple(_cells(row) for row in rows_of_posterior(tree))
@@ -368,7 +334,7 @@ def _cells(row: dict[str, Any]) -> tuple[str, ...]:
     )
 
 
-def remarks(tree: xr.DataTree) -> dict[str, list[str]]:
+def remarks(tree: DataTree) -> dict[str, list[str]]:
     """Assessments of the laws, warnings about their draws, and notes, a sentence each."""
     found: dict[str, list[str]] = {"assessments": [], "warnings": []}
     for data in law_groups(tree):
@@ -380,14 +346,8 @@ def remarks(tree: xr.DataTree) -> dict[str, list[str]]:
     return found | {"notes": str(tree.attrs["notes"]).split("\n")}
 
 
-def write_csv(tree: xr.DataTree, path: Path) -> None:
-    """Write the table of a posterior in SI; the unit of a value is in its row.
-
-    Raises
-    ------
-    FileError
-        If it cannot be written.
-    """
+def write_csv(tree: DataTree, path: Path) -> None:
+    """Write the table of a posterior in SI; the unit of a value is in its row."""
     rows = rows_of_posterior(tree)
     blank = [{key: None if one != one else one for key, one in row.items()} for row in rows]
     units = {

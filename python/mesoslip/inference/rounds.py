@@ -14,12 +14,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from mesoslip.array_types import Array
 from mesoslip.errors import RunError
 from mesoslip.inference.likelihood import Projection, Surrogate, learn, project, usable
 from mesoslip.inference.sampler import draw
 from mesoslip.inference.simulations import Simulations
-
-Array = NDArray[np.float64]
 
 # Fractions of the simulations in the first round and in each of the next ones, their minimum
 # numbers, and the maximum fraction before the region is final.

@@ -6,11 +6,9 @@ from collections.abc import Callable
 from importlib.util import find_spec
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mesoslip.array_types import Array
 from mesoslip.errors import RunError
-
-Array = NDArray[np.float64]
 
 # Number of walkers of an ensemble, of steps of burn-in, and of steps between draws.
 WALKERS, BURN_IN, THIN = 100, 120, 15

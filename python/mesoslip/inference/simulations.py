@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip.analysis.sampled_slips import FoundSlips
+from mesoslip.array_types import Array
 from mesoslip.execution.executors import ExecutorLike, as_executor, completed
 from mesoslip.execution.pool import Function, Result
 from mesoslip.execution.program import program
@@ -21,8 +22,6 @@ from mesoslip.execution.store import Store
 from mesoslip.inference.features import Feature
 from mesoslip.inference.prior import Prior
 from mesoslip.inference.traced_experiment import Experiment
-
-Array = NDArray[np.float64]
 
 # The number of a simulation, its parameters on the unit cube, and whether it has few contacts.
 Piece = tuple[int, Array, bool]

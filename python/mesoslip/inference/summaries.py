@@ -13,13 +13,13 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mesoslip.analysis.alternating_extremes import Samples
 from mesoslip.analysis.power_spectrum import power_spectrum
 from mesoslip.analysis.sampled_slips import FoundSlips
 from mesoslip.analysis.sampled_slips.windows import Windows, lines_through
 from mesoslip.analysis.strokes import Piece, find_slips_between_reversals
+from mesoslip.array_types import Array
 from mesoslip.inference.features import (
     BANDS,
     CREEP_LAGS,
@@ -30,8 +30,6 @@ from mesoslip.inference.features import (
     features,
 )
 from mesoslip.quantities import with_unit
-
-Array = NDArray[np.float64]
 
 # Range of the force for the slope of the loading, over the first peak.
 LOADING = (0.1, 0.6)
@@ -262,8 +260,7 @@ class Summarizer:
         start = self.time[above]
         start[falls] += ((force[above] - half)[falls] / step[falls]) * self._interval
         points = start[:, np.newaxis] + WAVEFORM * self.period
-        waveforms: Array = np.interp(points, self.time, force)
-        return waveforms
+        return np.interp(points, self.time, force)
 
 
 def _loaded(force: Array) -> int:

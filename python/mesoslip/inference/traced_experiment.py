@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from mesoslip.analysis.apparatus import first_velocity
 from mesoslip.analysis.even_traces import INTERVAL_TOLERANCE
 from mesoslip.analysis.sampled_slips import estimated_period
 from mesoslip.analysis.strokes import Piece, monotone_pieces
+from mesoslip.array_types import Array, Dataset, DataTree
 from mesoslip.configuration.config import Config
 from mesoslip.errors import ConfigError, FileError, RunError
 from mesoslip.execution.stop import StoppedError, StopRequest
@@ -28,10 +29,6 @@ from mesoslip.inference.wander import measured_length, wandering
 from mesoslip.simulation.realization import Realization
 from mesoslip.simulation.recorded_tables import TRACE_COLUMNS
 
-if TYPE_CHECKING:
-    import xarray as xr
-
-Array = NDArray[np.float64]
 # Seeds of random numbers.
 Words = NDArray[np.unsignedinteger[Any]]
 
@@ -198,7 +195,7 @@ class Experiment:
         return self.force + self.sampling.reduced(extra)
 
 
-def prepare(tree: xr.DataTree, plan: Plan, name: str = "", number: int = 0) -> Experiment:
+def prepare(tree: DataTree, plan: Plan, name: str = "", number: int = 0) -> Experiment:
     """An experiment from the first realization of an output, by number of the trace in the fit."""
     if "spring_force" not in tree.data_vars:
         if "friction_coefficient" in tree.data_vars:
@@ -291,7 +288,7 @@ def prepare(tree: xr.DataTree, plan: Plan, name: str = "", number: int = 0) -> E
 
 
 def _pieces(
-    root: xr.Dataset, is_known: NDArray[np.bool_], sampling: Sampling
+    root: Dataset, is_known: NDArray[np.bool_], sampling: Sampling
 ) -> tuple[Piece, ...] | None:
     """Pieces of a recorded drive that goes back and forth, as samples of the reduced trace."""
     if "drive_displacement" not in root:

@@ -10,11 +10,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mesoslip.array_types import Array
 from mesoslip.inference.summaries import Summarizer
-
-Array = NDArray[np.float64]
 
 # Points of the random force in a correlation length.
 POINTS = 5

@@ -18,6 +18,7 @@ from mesoslip.execution.executors import ExecutorLike, ThreadsThenProcesses, as_
 from mesoslip.execution.stop import Stop, StopRequest
 from mesoslip.measured.trace import trace_of, understand
 from mesoslip.output import targets, writing
+from mesoslip.output.variables import force_among
 
 PACKED = (".gz", ".bz2", ".xz", ".zip")
 # Columns of the table and their units; of forces see the column of their unit.
@@ -117,7 +118,7 @@ def read_piece(piece: Piece, stop: Stop) -> Row:  # noqa: ARG001
 def _statistics(tree: Any) -> Iterator[tuple[str, Any]]:
     """Values of an output by column."""
     root = tree.to_dataset()
-    name = "spring_force" if "spring_force" in root else "friction_coefficient"
+    name = force_among(root)
     force, time = root[name].values[0], root["time"].values
     yield "force_unit", root[name].attrs["units"]
     yield "samples", time.size

@@ -10,19 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip.analysis.strokes import monotone_pieces
+from mesoslip.array_types import Array
 from mesoslip.configuration.columns import IGNORED
-from mesoslip.configuration.units import NUMBER, number_of, to_si
+from mesoslip.configuration.units import NUMBER, is_number, to_si
 from mesoslip.errors import ConfigError, FileError, Problem, shown
 from mesoslip.measured.description import Column, Columns
-from mesoslip.measured.headers import (
-    EITHER,
-    QUANTITIES,
-    Heading,
-    bare_name,
-    name_of,
-    read_header,
-)
-from mesoslip.measured.reading.table import Array, Table, listed
+from mesoslip.measured.headers import EITHER, QUANTITIES, Heading, bare_name, name_of, read_header
+from mesoslip.measured.reading.table import Table, listed
 from mesoslip.measured.units import plain, size_of, unit_named
 
 # Examples of headers.
@@ -240,7 +234,7 @@ def _factor(text: str, unit: str, si: str) -> tuple[float, str]:
     text = plain(text)
     try:
         # A quantity for each number of the column, whatever its unit.
-        return to_si(float(text) if _is_number(text) and si == "1" else text, si, ""), unit
+        return to_si(float(text) if is_number(text) and si == "1" else text, si, ""), unit
     except ValueError:
         pass
     above, slash, below = text.rpartition("/")
@@ -267,14 +261,6 @@ def _factor(text: str, unit: str, si: str) -> tuple[float, str]:
     if volts is None or of_column is None:
         raise ValueError(f"{wanted}; the column is in {shown(unit)}, not in {shown(below)}")
     return size * of_column / volts, unit
-
-
-def _is_number(text: str) -> bool:
-    try:
-        number_of(text)
-    except ValueError:
-        return False
-    return True
 
 
 def _offset(text: str | None, unit: str) -> float:

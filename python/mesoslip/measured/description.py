@@ -15,7 +15,7 @@ from mesoslip.configuration.config import Config
 from mesoslip.configuration.files import read_toml
 from mesoslip.configuration.messages import problems
 from mesoslip.configuration.table import Table, Text, Whole, problem
-from mesoslip.configuration.units import number_of, to_si
+from mesoslip.configuration.units import is_number, number_of, to_si
 from mesoslip.errors import ConfigError, Problem, shown
 
 
@@ -221,7 +221,7 @@ class TraceDescription(Table):
             return None
         for unit in UNITS[name]:
             try:
-                return to_si(text if not _is_plain(text) else float(text), unit, "")
+                return to_si(text if not is_number(text) else float(text), unit, "")
             except ValueError:
                 continue
         raise AssertionError(name)
@@ -229,7 +229,7 @@ class TraceDescription(Table):
     def is_in(self, name: str, unit: str) -> bool:
         """Whether a quantity is given with a unit of the dimension of an SI unit."""
         text = getattr(self, name)
-        if text is None or _is_plain(text):
+        if text is None or is_number(text):
             return False
         try:
             to_si(text, unit, "")
@@ -242,15 +242,6 @@ class TraceDescription(Table):
         import tomli_w
 
         return tomli_w.dumps({"trace": self.model_dump(exclude_none=True, exclude_defaults=True)})
-
-
-def _is_plain(text: str) -> bool:
-    """Whether a quantity has no unit, as those of dimension 1."""
-    try:
-        number_of(text)
-    except ValueError:
-        return False
-    return True
 
 
 class Experiment(Table):

@@ -16,7 +16,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from mesoslip.analysis.noise.levels import NORMAL_MEDIAN
+from mesoslip.array_types import Array
+
 Integers = NDArray[np.int64]
 
 # Maximum number of means; half of them are around changes.
@@ -52,8 +54,6 @@ HOLD_ERRORS = 3.0
 # Minimum noise by rounding, over the range of the displacement, and in metres.
 MIN_NOISE = 1e-9
 MIN_DEVIATION = 1e-15
-# Median of the absolute value of a standard normal deviate.
-NORMAL_MEDIAN = 0.6744897501960817
 
 
 @dataclass(frozen=True)
@@ -289,8 +289,7 @@ def _costs(points: _Points, start: int) -> Array:
     # A record may be shorter than any piece.
     if start == 0 and t.size < MIN_LINE:
         line[-1] = 0.0
-    cost: Array = np.minimum(line, parabola)
-    return cost
+    return np.minimum(line, parabola)
 
 
 def _refined(points: _Points, bounds: Sequence[int]) -> Integers:

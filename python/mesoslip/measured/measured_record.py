@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from mesoslip.array_types import Array
 from mesoslip.errors import FileError, shown
 from mesoslip.measured.columns import FORCES, Assignment, Used, assign, sentinels, values_of
 from mesoslip.measured.description import Column, TraceDescription
@@ -17,7 +18,7 @@ from mesoslip.measured.headers import QUANTITIES, name_of
 from mesoslip.measured.parts import continued, joined
 from mesoslip.measured.reading.blocks import blocks_of
 from mesoslip.measured.reading.file import read_file
-from mesoslip.measured.reading.table import Array, Table, listed
+from mesoslip.measured.reading.table import Table, listed
 from mesoslip.measured.sampling import in_order, sampling_report, sampling_summary
 from mesoslip.measured.thinning import thinned
 from mesoslip.quantities import number, with_unit

@@ -3,24 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
 
 import numpy as np
 
-from mesoslip.analysis.apparatus import with_force_unit
 from mesoslip.analysis.noise import TraceNoise
 from mesoslip.analysis.sampled_slips import FoundSlips
+from mesoslip.array_types import Dataset
 from mesoslip.measured.load_point import DriveStage
 from mesoslip.output import variables
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 
 def slip_group(
     found: FoundSlips, velocity: float | None, stiffness: float | None, unit: str
-) -> xr.Dataset:
+) -> Dataset:
     """The catalogue of slips, with peak velocities if drive and stiffness are known.
 
     The unit is that of the force, "N" or "1", here and in the other groups.
@@ -39,10 +35,10 @@ def slip_group(
         "contacts_broken": np.full(len(found), np.nan),
         "peak_fall_rate": found.fall_rate,
     }
-    return _group(variables.MEASURED_SLIPS, columns, "slip", unit)
+    return variables.MEASURED_SLIPS.dataset(("slip",), columns, unit)
 
 
-def noise_group(noise: TraceNoise, unit: str) -> xr.Dataset:
+def noise_group(noise: TraceNoise, unit: str) -> Dataset:
     """The noise: scalars, the samples of impulses, and lines of hum."""
     import xarray as xr
 
@@ -53,14 +49,14 @@ def noise_group(noise: TraceNoise, unit: str) -> xr.Dataset:
     impulses = {"impulse_time": noise.impulse_time}
     return xr.merge(
         [
-            _group(variables.NOISE, noise.scalars(), None, unit),
-            _group(variables.NOISE, impulses, "impulse", unit),
-            _group(variables.NOISE, hum, "line", unit),
+            variables.NOISE.dataset((), noise.scalars(), unit),
+            variables.NOISE.dataset(("impulse",), impulses, unit),
+            variables.NOISE.dataset(("line",), hum, unit),
         ]
     )
 
 
-def count_group(found: FoundSlips, unit: str) -> xr.Dataset:
+def count_group(found: FoundSlips, unit: str) -> Dataset:
     """Numbers of slips by minimum fall, with the minimum fall of the catalogue."""
     counts = found.counts
     columns = {
@@ -68,14 +64,14 @@ def count_group(found: FoundSlips, unit: str) -> xr.Dataset:
         "slip_count": counts.count,
         "mirrored_count": counts.mirrored_count,
     }
-    data = _group(variables.SLIP_COUNTS, columns, "threshold", unit)
+    data = variables.SLIP_COUNTS.dataset(("threshold",), columns, unit)
     data.attrs["used"] = found.min_fall
     if counts.plateau is not None:
         data.attrs["plateau"] = list(counts.plateau)
     return data
 
 
-def stage_group(stages: Sequence[DriveStage]) -> xr.Dataset:
+def stage_group(stages: Sequence[DriveStage]) -> Dataset:
     """The stages of the drive."""
     group = variables.MEASURED_STAGES
     columns = {
@@ -88,22 +84,4 @@ def stage_group(stages: Sequence[DriveStage]) -> xr.Dataset:
         "drive_velocity_error": [one.velocity_error for one in stages],
     }
     arrays = {name: np.array(one, dtype=group[name].dtype) for name, one in columns.items()}
-    return _group(group, arrays, "stage", "N")
-
-
-def _group(
-    group: variables.Group,
-    columns: Mapping[str, Any],
-    dimension: str | None,
-    unit: str,
-) -> xr.Dataset:
-    """A group with the unit of the force in place of newtons."""
-    import xarray as xr
-
-    dimensions = () if dimension is None else (dimension,)
-    data = xr.Dataset(
-        {name: group.variable(name, dimensions, values) for name, values in columns.items()}
-    )
-    for one in data.data_vars.values():
-        one.attrs["units"] = with_force_unit(one.attrs["units"], unit)
-    return data
+    return group.dataset(("stage",), arrays)

@@ -8,8 +8,9 @@ from itertools import pairwise
 
 import numpy as np
 
+from mesoslip.array_types import Array
 from mesoslip.errors import FileError
-from mesoslip.measured.reading.table import Array, BadCell, Table
+from mesoslip.measured.reading.table import BadCell, Table
 
 
 def joined(tables: Sequence[Table]) -> Table:

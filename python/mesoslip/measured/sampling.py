@@ -11,11 +11,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from mesoslip.array_types import Array
 from mesoslip.errors import FileError
 from mesoslip.measured.reading.table import listed
 from mesoslip.quantities import number, with_unit
 
-Array = NDArray[np.float64]
 Numbers = NDArray[np.int_]
 
 # Minimum interval of a gap, over the usual one around it.
@@ -96,11 +96,6 @@ def _without_odd(time: Array, rows: Numbers, lines: Numbers, notes: list[str], r
     return np.delete(rows, chosen)
 
 
-def _runs(time: Array, rows: Numbers) -> list[Numbers]:
-    """Rows in pieces of times that do not decrease."""
-    return np.split(rows, np.flatnonzero(np.diff(time[rows]) < 0) + 1)
-
-
 def _without_repeated(
     time: Array,
     values: Sequence[Array],
@@ -137,7 +132,8 @@ def _one_part(
     row: str,
 ) -> Numbers:
     """Put blocks in order, and choose a part if the clock starts again."""
-    runs = _runs(time, rows)
+    # Rows in pieces of times that do not decrease.
+    runs = np.split(rows, np.flatnonzero(np.diff(time[rows]) < 0) + 1)
     parts: list[list[Numbers]] = [[runs[0]]]
     for run in runs[1:]:
         if _fits(time, parts[-1], run):

@@ -13,9 +13,10 @@ from itertools import chain
 import numpy as np
 from numpy.typing import NDArray
 
+from mesoslip.array_types import Array
 from mesoslip.errors import FileError
 from mesoslip.measured.columns import Assignment, sentinels
-from mesoslip.measured.reading.table import Array, BadCell, Table
+from mesoslip.measured.reading.table import BadCell, Table
 from mesoslip.quantities import number
 
 # Half the length of the filter over the number of samples for each that is kept.

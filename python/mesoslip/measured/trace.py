@@ -8,10 +8,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mesoslip.analysis.apparatus import first_velocity
 from mesoslip.analysis.noise import TraceNoise, estimate_noise
@@ -22,6 +21,7 @@ from mesoslip.analysis.strokes import (
     monotone_pieces,
     record_pieces,
 )
+from mesoslip.array_types import Array, DataTree
 from mesoslip.configuration.config import Config
 from mesoslip.configuration.reading import PathLike, as_path
 from mesoslip.errors import ConfigError, Problem
@@ -39,11 +39,6 @@ from mesoslip.measured.sampling import MAX_RATES
 from mesoslip.output import variables
 from mesoslip.output.inputs import ConfigLike
 from mesoslip.output.provenance import program_attributes
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -101,7 +96,7 @@ class Understood:
         return [*self.record.summary, *self._noise_lines(MAX_RATES)]
 
     def _noise_lines(self, max_rates: float) -> list[str]:
-        """Lines about the noise, with that at each rate if there are at most so many."""
+        """Lines about the noise, with that at each rate up to a maximum number of rates."""
         if not isinstance(self.noise, TraceNoise):
             return []
         unit = "1" if self.record.is_friction else "N"
@@ -186,7 +181,7 @@ def read_trace(
     period: str | float | None = None,
     part: int | None = None,
     min_fall: str | float | None = None,
-) -> xr.DataTree:
+) -> DataTree:
     """Read a measured trace as the laboratory wrote it, as an output like that of a run.
 
     Quantities are strings with units, such as "1002 N/m", or numbers in SI. They replace keys of
@@ -282,7 +277,7 @@ def read_trace(
     )
 
 
-def trace_of(understood: Understood) -> xr.DataTree:
+def trace_of(understood: Understood) -> DataTree:
     """The output of the interpretation of a file; see `read_trace`."""
     record, trace = understood.record, understood.experiment.trace
     measured_file = ", ".join(one.name for one in understood.paths)
@@ -453,7 +448,7 @@ def _tree(
     found: FoundSlips,
     velocity: float | None,
     attributes: dict[str, Any],
-) -> xr.DataTree:
+) -> DataTree:
     import xarray as xr
 
     record = understood.record

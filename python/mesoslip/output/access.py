@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, overload
+from typing import overload
 
+from mesoslip.array_types import Dataset, DataTree
 from mesoslip.configuration.config import Config
 from mesoslip.errors import ConfigError, FileError
 from mesoslip.output.arrays import Arrays, Tree
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 
 def is_measured(tree: Tree) -> bool:
@@ -30,14 +28,14 @@ def config_of(tree: Tree, name: str = "the output") -> Config:
 
 
 @overload
-def group_of(tree: xr.DataTree, name: str) -> xr.Dataset: ...
+def group_of(tree: DataTree, name: str) -> Dataset: ...
 
 
 @overload
-def group_of(tree: Tree, name: str) -> xr.Dataset | Arrays: ...
+def group_of(tree: Tree, name: str) -> Dataset | Arrays: ...
 
 
-def group_of(tree: Tree, name: str) -> xr.Dataset | Arrays:
+def group_of(tree: Tree, name: str) -> Dataset | Arrays:
     """A group of an output, without the coordinates of the root that it does not use.
 
     With them, `xarray.Dataset.to_dataframe` would repeat each row for every time of the trace.
@@ -48,7 +46,7 @@ def group_of(tree: Tree, name: str) -> xr.Dataset | Arrays:
     return data[list(data.data_vars)]
 
 
-def trace_suffixes(posterior: xr.DataTree) -> list[str]:
+def trace_suffixes(posterior: DataTree) -> list[str]:
     """Suffixes of the groups of the traces of a fit: "" for the first, "_2" for the second."""
     found, number = [""], 2
     while f"observed_data_{number}" in posterior.children:

@@ -15,12 +15,12 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from mesoslip.array_types import DataTree
 from mesoslip.output.hdf5 import LOCK
 from mesoslip.output.old_names import attributes_of, present_names
 
 if TYPE_CHECKING:
     import netCDF4
-    import xarray as xr
 
 Array = NDArray[Any]
 
@@ -160,7 +160,7 @@ class Arrays(Mapping[str, Variable]):
         return Arrays(variables, sizes, self.attrs)
 
 
-def in_xarray(arrays: Arrays) -> xr.DataTree:
+def in_xarray(arrays: Arrays) -> DataTree:
     """A group with variables in memory, and the groups in it, as a tree of datasets."""
     import xarray as xr
 
@@ -172,7 +172,7 @@ def in_xarray(arrays: Arrays) -> xr.DataTree:
 
 
 # An output, of which only the common interface is used.
-Tree: TypeAlias = "Arrays | xr.DataTree"
+Tree: TypeAlias = "Arrays | DataTree"
 
 
 def arrays_of(group: netCDF4.Dataset) -> Arrays | None:

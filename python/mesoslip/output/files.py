@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import netCDF4
 
+from mesoslip.array_types import DataTree
 from mesoslip.configuration.config import Config
 from mesoslip.configuration.reading import is_directory
 from mesoslip.errors import FileError
@@ -19,9 +20,6 @@ from mesoslip.output.kinds import KINDS
 from mesoslip.output.old_names import renamed
 from mesoslip.output.validity import check_output, check_signature
 from mesoslip.output.variables import has_force
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 # Objects built from a file.
 T = TypeVar("T", bound=Tree)
@@ -42,7 +40,7 @@ DAMAGES = (
 
 
 @contextmanager
-def opened(path: str | Path) -> Iterator[xr.DataTree]:
+def opened(path: str | Path) -> Iterator[DataTree]:
     """An output of any command; data are read when needed.
 
     Raises a `FileError` if it is not an output, is damaged, or refers to other files.
@@ -109,7 +107,7 @@ def _built(path: Path, stack: ExitStack, build: Callable[[netCDF4.Dataset], T]) 
             netCDF4.set_chunk_cache(*before)
 
 
-def _tree(file: netCDF4.Dataset) -> xr.DataTree:
+def _tree(file: netCDF4.Dataset) -> DataTree:
     """All groups of a file, with present names of variables."""
     import xarray as xr
     from xarray.backends import NetCDF4DataStore
@@ -130,7 +128,7 @@ def _close(file: netCDF4.Dataset) -> None:
         file.close()
 
 
-def read(path: str | Path) -> xr.DataTree:
+def read(path: str | Path) -> DataTree:
     """Read an output of any command into memory; see `opened`."""
     with opened(path) as tree:
         try:
@@ -139,7 +137,7 @@ def read(path: str | Path) -> xr.DataTree:
             raise FileError(f"{path}: a damaged netCDF-4 file") from error
 
 
-def read_run(path: str | Path) -> xr.DataTree:
+def read_run(path: str | Path) -> DataTree:
     """Read an output of ``mesoslip run`` into memory; see `read`."""
     tree = read(path)
     check_run(tree, path)
@@ -147,7 +145,7 @@ def read_run(path: str | Path) -> xr.DataTree:
 
 
 @contextmanager
-def opened_run(path: str | Path) -> Iterator[xr.DataTree]:
+def opened_run(path: str | Path) -> Iterator[DataTree]:
     """An output of ``mesoslip run``; see `opened`."""
     with opened(path) as tree:
         check_run(tree, path)

@@ -8,17 +8,16 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
+from mesoslip.array_types import Dataset, DataTree
 from mesoslip.configuration.config import Config
 from mesoslip.configuration.reading import PathLike, as_path
 from mesoslip.errors import ConfigError, FileError, Problem, shown
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from mesoslip.output.arrays import Arrays, Tree
 
 ConfigLike: TypeAlias = PathLike | Mapping[str, Any] | Config
-OutputLike: TypeAlias = "PathLike | xr.DataTree | xr.Dataset"
+OutputLike: TypeAlias = "PathLike | DataTree | Dataset"
 
 
 def as_config(config: ConfigLike, overrides: Iterable[str] = ()) -> Config:
@@ -39,7 +38,7 @@ def as_config(config: ConfigLike, overrides: Iterable[str] = ()) -> Config:
     return Config.load(path, overrides)
 
 
-def open_output(path: PathLike) -> xr.DataTree:
+def open_output(path: PathLike) -> DataTree:
     """Read an output of any command into memory.
 
     Raises
@@ -52,12 +51,12 @@ def open_output(path: PathLike) -> xr.DataTree:
     return files.read(as_path(path))
 
 
-def as_output(output: OutputLike) -> xr.DataTree:
+def as_output(output: OutputLike) -> DataTree:
     """An output of any command in memory."""
     return open_output(output) if isinstance(output, str | os.PathLike) else _tree(output)
 
 
-def as_run(output: OutputLike) -> xr.DataTree:
+def as_run(output: OutputLike) -> DataTree:
     """An output of a run in memory."""
     from mesoslip.output import files
 
@@ -69,7 +68,7 @@ def as_run(output: OutputLike) -> xr.DataTree:
 
 
 @contextmanager
-def opened_run(output: OutputLike) -> Iterator[tuple[xr.DataTree, str]]:
+def opened_run(output: OutputLike) -> Iterator[tuple[DataTree, str]]:
     """An output of a run, read when needed, and its name for messages."""
     from mesoslip.output import files
 
@@ -92,7 +91,7 @@ def opened_run_arrays(output: OutputLike) -> Iterator[Tree]:
         yield as_run(output)
 
 
-def trace_name(output: OutputLike, tree: xr.DataTree) -> str:
+def trace_name(output: OutputLike, tree: DataTree) -> str:
     """A short name of an output with a trace, from its file or the measured file."""
     if isinstance(output, str | os.PathLike):
         return Path(output).stem
@@ -110,7 +109,7 @@ def opened(
     outputs: Sequence[OutputLike],
     stack: ExitStack,
     is_enough: Callable[[Arrays], bool] = lambda _: False,
-) -> tuple[list[xr.DataTree], list[str]]:
+) -> tuple[list[DataTree], list[str]]:
     """Outputs of any command, read when needed, and their names; the stack closes files.
 
     Files are read as `Arrays` if that is enough.
@@ -122,7 +121,7 @@ def opened(
         if isinstance(one, str | os.PathLike):
             names.append(str(one))
             tree = stack.enter_context(files.opened_for(Path(one), is_enough))
-            trees.append(cast("xr.DataTree", tree))
+            trees.append(cast("DataTree", tree))
         else:
             tree = _tree(one)
             trees.append(tree)
@@ -130,7 +129,7 @@ def opened(
     return trees, names
 
 
-def _tree(output: object) -> xr.DataTree:
+def _tree(output: object) -> DataTree:
     """An output in memory as a tree."""
     import xarray as xr
 

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from mesoslip.array_types import Dataset
 from mesoslip.output import variables
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 # Present names by earlier name, by group.
 OLD_NAMES = {
@@ -50,7 +48,7 @@ def attributes_of(group: str, name: str) -> dict[str, str]:
     return GROUPS[group][name].attributes
 
 
-def renamed(name: str, data: xr.Dataset) -> xr.Dataset:
+def renamed(name: str, data: Dataset) -> Dataset:
     """A group of a file with present names of variables."""
     old = present_names(name, data.variables, data.dims)
     if not old:

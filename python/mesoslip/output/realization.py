@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from mesoslip.array_packages import import_xarray
+from mesoslip.array_types import Dataset
 from mesoslip.output import variables
 from mesoslip.output.layout import DIMENSIONS
 from mesoslip.output.variables import Group
 from mesoslip.simulation import realization
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 # What the columns of a table mean, and the names in files of those that have others there.
 MEANINGS: dict[str, Group] = {
@@ -97,7 +93,7 @@ class Realization(realization.Realization):
         Steps, evaluations and failed steps of the slider's integrator, if it has one.
     """
 
-    def table(self, name: str) -> xr.Dataset:
+    def table(self, name: str) -> Dataset:
         """Rows recorded in a table up to now, with units.
 
         Parameters

@@ -4,31 +4,24 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mesoslip.array_types import Array, Dataset
 from mesoslip.output.access import group_of
 from mesoslip.output.arrays import Arrays, Tree
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-Array = NDArray[np.float64]
 
 
 def times_of(tree: Tree) -> Array:
     """Times of the trace [s]."""
-    times: Array = tree.to_dataset()["time"].values
-    return times
+    return tree.to_dataset()["time"].values
 
 
 @dataclass(frozen=True)
 class Samples:
     """Samples of a realization in order of time [s]; those in a file are read when needed."""
 
-    data: xr.Dataset | Arrays
+    data: Dataset | Arrays
     dimension: str
     times: Array
     start: int = 0
@@ -43,8 +36,7 @@ class Samples:
         if name == "time":
             return self.times[first:after]
         chosen = slice(self.start + first, self.start + after)
-        values: Array = self.data[name].isel({self.dimension: chosen}).values.astype(float)
-        return values
+        return self.data[name].isel({self.dimension: chosen}).values.astype(float)
 
 
 def samples(tree: Tree, realization: int = 0) -> list[Samples]:

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from numpy.typing import NDArray
+
 from mesoslip.output.targets import written_whole
 
 # Endings of files of printed tables; all others are comma-separated values.
@@ -87,9 +89,27 @@ def write_printed(tables: Sequence[PrintedTable], path: Path) -> None:
         part.write_text("\n\n".join(parts) + "\n", encoding="utf-8")
 
 
+def rows_of(columns: Mapping[str, NDArray[Any]]) -> list[dict[str, Any]]:
+    """A dictionary for each row of columns; None for unknown values."""
+    lists = (values.tolist() for values in columns.values())
+    return [
+        {name: None if value != value else value for name, value in zip(columns, row, strict=True)}
+        for row in zip(*lists, strict=True)
+    ]
+
+
 def write_table(rows: Iterable[Mapping[str, Any]], units: Mapping[str, str], path: Path) -> None:
     """Write rows as comma-separated values; the header has the unit of each column."""
+    write_tables([(rows, units)], path)
+
+
+def write_tables(
+    tables: Sequence[tuple[Iterable[Mapping[str, Any]], Mapping[str, str]]], path: Path
+) -> None:
+    """Write tables of rows with the units of their columns, with an empty line between them."""
     with written_whole(path) as part, part.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, list(units))
-        writer.writerow({name: f"{name} [{unit}]" for name, unit in units.items()})
-        writer.writerows(rows)
+        for number, (rows, units) in enumerate(tables):
+            file.write("\n" if number else "")
+            writer = csv.DictWriter(file, list(units))
+            writer.writerow({name: f"{name} [{unit}]" for name, unit in units.items()})
+            writer.writerows(rows)

@@ -29,14 +29,18 @@ OTHER_KINDS = {".csv", ".txt", ".png", ".pdf", ".svg", ".html", ".json"}
 PROBE_BYTES = 2**16
 
 
-def check_writable(path: Path, reads: Iterable[str | Path] = ()) -> None:
-    """Refuse, before a run, a path that cannot be written, or that the command ``reads``."""
-    _check(path, reads, is_output=False)
+def check_writable(path: Path | None, reads: Iterable[str | Path] = ()) -> None:
+    """Refuse, before a run, a path that cannot be written, or that the command ``reads``; None if
+    nothing is written."""
+    if path is not None:
+        _check(path, reads, is_output=False)
 
 
-def check_output(path: Path, reads: Iterable[str | Path] = ()) -> None:
+def check_output(path: Path | None, reads: Iterable[str | Path] = ()) -> None:
     """Refuse a path with the ending or the content of another kind of file, or as
     `check_writable`."""
+    if path is None:
+        return
     if path.suffix.lower() in OTHER_KINDS:
         raise FileError(
             f"{path}: an output is netCDF, and its name must not end in {path.suffix}; "

@@ -7,18 +7,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mesoslip.array_types import DataTree
 from mesoslip.output.filling import blocks
 from mesoslip.output.layout import describe
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from mesoslip.simulation.run_realizations import Results
 
 Array = NDArray[Any]
 
 
-def build_tree(results: Results) -> xr.DataTree:
+def build_tree(results: Results) -> DataTree:
     """The results of a run in memory, with the layout of an output file."""
     import xarray as xr
 

@@ -5,19 +5,17 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mesoslip.array_types import Dataset
 from mesoslip.errors import FileError
 from mesoslip.output import variables
 from mesoslip.output.access import group_of, is_measured
 from mesoslip.output.arrays import Arrays, Tree
 from mesoslip.output.provenance import version
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 # Rows that are read at once.
 MAX_ROWS = 2**20
@@ -64,12 +62,9 @@ def check_signature(path: Path) -> None:
             f"{path}: is a configuration, not an output (netCDF); run it first: mesoslip run {path}"
         )
     if start != b"\x89HDF\r\n\x1a\n":
-        hint = f"; mesoslip trace {path} makes an output of a table" if _is_table(path) else ""
+        is_table = path.suffix.lower() in {".csv", ".txt", ".dat", ".tsv"}
+        hint = f"; mesoslip trace {path} makes an output of a table" if is_table else ""
         raise FileError(f"{path}: not an output (netCDF-4){hint}")
-
-
-def _is_table(path: Path) -> bool:
-    return path.suffix.lower() in {".csv", ".txt", ".dat", ".tsv"}
 
 
 def check_output(tree: Tree, name: str | Path) -> None:
@@ -150,7 +145,7 @@ def _wrong_rows(tree: Tree) -> list[str]:
     return []
 
 
-def _part(data: xr.Dataset | Arrays, name: str, dimension: str, rows: slice) -> NDArray[Any]:
+def _part(data: Dataset | Arrays, name: str, dimension: str, rows: slice) -> NDArray[Any]:
     """Rows of a variable; all of them are kept for those who need them next."""
     if data.sizes[dimension] <= MAX_ROWS:
         return np.asarray(data[name].values)

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-from numpy.typing import DTypeLike
+from numpy.typing import DTypeLike, NDArray
 
+from mesoslip.array_types import Dataset, Variable
 from mesoslip.simulation import fronts
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 
 @dataclass(frozen=True)
@@ -64,11 +63,59 @@ class Group(dict[str, Meaning]):
         """Some of the variables, in this order."""
         return Group({name: self[name] for name in names})
 
-    def variable(self, name: str, dimensions: Sequence[str], values: Any) -> xr.Variable:
+    def variable(self, name: str, dimensions: Sequence[str], values: Any) -> Variable:
         """A variable of the group with its units and long name."""
         import xarray as xr
 
         return xr.Variable(dimensions, values, self[name].attributes)
+
+    def dataset(
+        self,
+        dimensions: Sequence[str],
+        columns: Mapping[str, Any],
+        force_unit: str = "N",
+        attrs: Mapping[str, Any] | None = None,
+    ) -> Dataset:
+        """Variables of the group along the same dimensions."""
+        import xarray as xr
+
+        data = {name: self.variable(name, dimensions, one) for name, one in columns.items()}
+        for name, unit in self.units(force_unit).items():
+            if name in data:
+                data[name].attrs["units"] = unit
+        return xr.Dataset(data, attrs=attrs)
+
+    def units(self, force_unit: str = "N") -> dict[str, str]:
+        """CF units of the variables; see `with_force_unit`."""
+        return {name: with_force_unit(one.units, force_unit) for name, one in self.items()}
+
+    def columns(self, rows: Sequence[Mapping[str, Any]]) -> dict[str, NDArray[Any]]:
+        """Columns of rows; NaN for unknown values."""
+        return {
+            name: np.array([one.get(name, math.nan) for one in rows], dtype=meaning.dtype)
+            for name, meaning in self.items()
+        }
+
+    @property
+    def empty_row(self) -> dict[str, Any]:
+        """A row without values."""
+        return {
+            name: math.nan if one.dtype is np.float64 else "" if one.dtype is np.str_ else 0
+            for name, one in self.items()
+        }
+
+
+def with_force_unit(unit: str, force_unit: str) -> str:
+    """A unit with that of a force in newtons, in CF or for print; of friction coefficients if the
+    force unit is "1"."""
+    if force_unit != "1":
+        return unit
+    if unit == "J":
+        return "m"
+    first, _, others = unit.partition(" ")
+    if first == "N":
+        return others or "1"
+    return f"1/{unit[2:]}" if unit.startswith("N/") else unit
 
 
 # Rows of a catalogue have the index of their realization, as in CF's indexed ragged arrays.
@@ -106,12 +153,18 @@ MEASURED = Group(
     sliding_speed=Meaning("m s-1", "speed of sliding"),
     acoustic_emission=Meaning("V", "acoustic emission, or another second channel"),
 )
-FORCES = ("spring_force", "friction_coefficient")
+# Variables with the force of a run or of a measured trace, and their units.
+FORCES = {"spring_force": "N", "friction_coefficient": "1"}
 
 
 def has_force(names: Container[Any]) -> bool:
     """Whether variables are those of a run or of a measured trace."""
     return any(one in names for one in FORCES)
+
+
+def force_among(names: Container[Any]) -> str:
+    """The force at the drive, or the friction coefficient of a measured trace without forces."""
+    return "spring_force" if "spring_force" in names else "friction_coefficient"
 
 
 ROOT = Group(

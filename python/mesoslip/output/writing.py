@@ -11,6 +11,7 @@ import netCDF4
 import numpy as np
 
 from mesoslip import array_packages
+from mesoslip.array_types import Dataset, DataTree
 from mesoslip.configuration.config import Config
 from mesoslip.output import filling, layout
 from mesoslip.output.chunks import COMPRESSION_LEVEL, write_chunks
@@ -19,8 +20,6 @@ from mesoslip.output.layout import Entry, GroupLayout
 from mesoslip.output.targets import written_whole
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from mesoslip.simulation.run_realizations import Results
 
 # Number of values above which a variable is compressed.
@@ -29,7 +28,7 @@ MIN_COMPRESSED = 1000
 COMPRESSION: dict[str, Any] = {"zlib": True, "complevel": COMPRESSION_LEVEL, "shuffle": True}
 
 
-def write(tree: xr.DataTree, path: Path) -> None:
+def write(tree: DataTree, path: Path) -> None:
     """Write a tree as an output; its name appears only when it is whole."""
     encoding = {group.path: _encoding(group.to_dataset(inherit=False)) for group in tree.subtree}
     # xarray would import Dask to look for locks of its scheduler.
@@ -37,7 +36,7 @@ def write(tree: xr.DataTree, path: Path) -> None:
         tree.to_netcdf(part, engine="netcdf4", encoding=encoding)
 
 
-def _encoding(data: xr.Dataset) -> dict[str, dict[str, Any]]:
+def _encoding(data: Dataset) -> dict[str, dict[str, Any]]:
     """Compression of large variables, and missing values; CF has none for coordinates."""
     encoding: dict[str, dict[str, Any]] = {}
     for name, one in data.variables.items():

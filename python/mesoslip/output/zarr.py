@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from mesoslip.array_types import DataTree
 from mesoslip.errors import FileError
 from mesoslip.output.targets import private_folder
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 # Version of the format; version 3 has no text of fixed length.
 FORMAT = 2
@@ -17,7 +14,7 @@ FORMAT = 2
 MARK = ".zgroup"
 
 
-def write_zarr(tree: xr.DataTree, path: Path) -> None:
+def write_zarr(tree: DataTree, path: Path) -> None:
     """Write an output as a Zarr store, a folder that appears when it is whole.
 
     It replaces an earlier store. ``xarray.open_datatree(path, engine="zarr")`` reads it.

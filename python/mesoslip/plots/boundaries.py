@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import matplotlib as mpl
 import numpy as np
@@ -13,15 +13,10 @@ from matplotlib.contour import ContourSet
 from matplotlib.lines import Line2D
 from matplotlib.transforms import ScaledTranslation
 from numpy.polynomial import Polynomial
-from numpy.typing import NDArray
 
 from mesoslip.analysis.fronts import SLOW
+from mesoslip.array_types import Array, Dataset
 from mesoslip.plots.sweep_axis import SweptKey
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-Array = NDArray[np.float64]
 
 # The measures in whose pictures boundaries are drawn.
 REGIME, FRONT_TYPE = "regime", "front_type"
@@ -49,7 +44,7 @@ class Boundary(NamedTuple):
     is_positive: bool = False
     choice: str = REGIME
 
-    def excess(self, data: xr.Dataset, keys: list[SweptKey]) -> Array:
+    def excess(self, data: Dataset, keys: list[SweptKey]) -> Array:
         """The mean of the measure over realizations beyond the value, in the order of the keys; of
         a positive one in logarithms."""
         dimensions = data[self.choice].isel(realization=0).dims
@@ -85,7 +80,7 @@ BOUNDARIES = (
 )
 
 
-def _boundaries(data: xr.Dataset, choice: str) -> list[Boundary]:
+def _boundaries(data: Dataset, choice: str) -> list[Boundary]:
     """The boundaries in the picture of a choice whose measures a sweep has."""
     return [one for one in BOUNDARIES if one.choice == choice and one.measure in data]
 
@@ -95,7 +90,7 @@ def boundary_measures(names: list[str]) -> set[str]:
     return {one.measure for one in BOUNDARIES if one.choice in names}
 
 
-def draw_contours(axes: Axes, data: xr.Dataset, choice: str, keys: list[SweptKey]) -> list[Line2D]:
+def draw_contours(axes: Axes, data: Dataset, choice: str, keys: list[SweptKey]) -> list[Line2D]:
     """Draw the boundaries that the map of a choice crosses; returns lines for a legend.
 
     A line crosses the edges between neighbours of different signs once, and no others.
@@ -181,7 +176,7 @@ def _curve(line: Array, keys: list[SweptKey]) -> Array:
     return np.column_stack([key.values_at(one) for key, one in zip(keys, fine.T, strict=True)])
 
 
-def draw_crossings(axes: Axes, data: xr.Dataset, choice: str, key: SweptKey) -> list[Line2D]:
+def draw_crossings(axes: Axes, data: Dataset, choice: str, key: SweptKey) -> list[Line2D]:
     """Draw the boundaries of a choice along one key; returns lines for a legend."""
     drawn = []
     for one in _boundaries(data, choice):

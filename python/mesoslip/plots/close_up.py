@@ -12,11 +12,12 @@ from mesoslip.analysis.slips import catalogue_of
 from mesoslip.output.access import config_of, is_measured
 from mesoslip.output.arrays import Tree
 from mesoslip.output.samples import samples, times_of
+from mesoslip.output.variables import force_among
 from mesoslip.plots.axis import time_since
 from mesoslip.plots.curves import Curve, curve, draw_curves
 from mesoslip.plots.extent import EVERYTHING, Extent
 from mesoslip.plots.style import BLUE, CONTACT, RED, SPRING, legend_above
-from mesoslip.plots.trace_variables import NAMES, driving_force_of, force_of, is_known
+from mesoslip.plots.trace_variables import NAMES, force_of, is_known
 
 # A slip: its columns of the catalogue, in SI.
 Slip = Mapping[str, float]
@@ -56,7 +57,7 @@ def draw_slip(
     near = Extent(extent.first, max(low, times[0]), min(high, times[-1]), parts=extent.parts)
     horizontal = time_since((near.start, near.end))
     sampling = Sampling.of(tree, slip, extent.first)
-    name, (force, *below) = driving_force_of(tree), panels
+    name, (force, *below) = force_among(tree.data_vars), panels
     curves = []
     if is_known(tree, "contact_force"):
         curves.append(sampling.curve(tree, "contact_force", near, **CONTACT))

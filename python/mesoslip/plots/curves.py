@@ -7,16 +7,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
 
+from mesoslip.array_types import Array
 from mesoslip.output.arrays import Tree
 from mesoslip.plots.axis import HorizontalAxis
 from mesoslip.plots.extent import Extent
 from mesoslip.plots.lines import line, max_size
 from mesoslip.plots.trace_variables import NAMES, UNITS
 from mesoslip.quantities import scale_for
-
-Array = NDArray[np.float64]
 
 # Maximum number of other realizations that are drawn behind the first one.
 MAX_OTHERS = 20

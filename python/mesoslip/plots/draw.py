@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from matplotlib.axes import Axes
 
+from mesoslip.array_types import DataTree
 from mesoslip.configuration import differences
 from mesoslip.errors import FileError
 from mesoslip.output.access import config_of, is_measured
@@ -18,9 +19,6 @@ from mesoslip.plots.movie import Movie
 from mesoslip.plots.style import Canvas, legend_above, styled
 from mesoslip.plots.views import VIEWS, view_of
 from mesoslip.plots.views.base import Options, View
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 NO_OPTIONS = Options()
 # Views of a movie for which none was asked: the first that the output has.
@@ -35,7 +33,7 @@ class Picture(NamedTuple):
 
 
 def picture(
-    trees: Sequence[xr.DataTree],
+    trees: Sequence[DataTree],
     names: Sequence[str],
     view: str | None = None,
     options: Options = NO_OPTIONS,
@@ -52,7 +50,7 @@ def picture(
 
 
 def _comparison(
-    trees: Sequence[xr.DataTree], names: Sequence[str], view: str | None, options: Options
+    trees: Sequence[DataTree], names: Sequence[str], view: str | None, options: Options
 ) -> Picture:
     kind = kind_of_all(trees, names)
     chosen, options = _chosen(trees[0], view, options)
@@ -71,7 +69,7 @@ def _comparison(
     return Picture(lambda figure: chosen.compare(trees, labels, options, figure), panel)
 
 
-def movie_of(tree: xr.DataTree, name: str | None = None, options: Options = NO_OPTIONS) -> Movie:
+def movie_of(tree: DataTree, name: str | None = None, options: Options = NO_OPTIONS) -> Movie:
     """The movie of a view of an output, by default of the first of `MOVIES` that it has."""
     if name is not None:
         chosen, options = _chosen(tree, name, options)
@@ -93,7 +91,7 @@ def movie_of(tree: xr.DataTree, name: str | None = None, options: Options = NO_O
     raise FileError("\n".join(reasons or [f"{KINDS[kind_of(tree)].description} has no movie"]))
 
 
-def _chosen(tree: xr.DataTree, name: str | None, options: Options) -> tuple[View, Options]:
+def _chosen(tree: DataTree, name: str | None, options: Options) -> tuple[View, Options]:
     """The view of a name, and its options; the name of a view of a sweep is that of a measure."""
     kind = kind_of(tree)
     takes_measure = any(one.name == one.kind == kind and "measure" in one.options for one in VIEWS)
@@ -102,7 +100,7 @@ def _chosen(tree: xr.DataTree, name: str | None, options: Options) -> tuple[View
     return view_of(tree, name, options), options
 
 
-def labels_of(trees: Sequence[xr.DataTree], names: Sequence[str]) -> list[str]:
+def labels_of(trees: Sequence[DataTree], names: Sequence[str]) -> list[str]:
     """A label for each output: how it differs from the others."""
     short = [plain(Path(name).stem if name.endswith(".nc") else name) for name in names]
     try:
@@ -118,7 +116,7 @@ def labels_of(trees: Sequence[xr.DataTree], names: Sequence[str]) -> list[str]:
 
 
 def draw(
-    trees: Sequence[xr.DataTree],
+    trees: Sequence[DataTree],
     names: Sequence[str],
     view: str | None = None,
     options: Options = NO_OPTIONS,

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
 
 from mesoslip.analysis.experiment_stages import Experiment
 from mesoslip.analysis.response import creep_line, friction_line, response_of
+from mesoslip.array_types import Array
 from mesoslip.configuration.config import Config
 from mesoslip.errors import MesoslipError
 from mesoslip.output.arrays import Arrays, Tree
@@ -16,8 +16,6 @@ from mesoslip.plots.response_record import MAX_MARKS
 from mesoslip.plots.style import BLUE, POINTS, RED, Canvas, canvas, titles, write_title
 from mesoslip.quantities import scale_for, with_error
 from mesoslip.theory.contacts import contact_theory
-
-Array = NDArray[np.float64]
 
 # Maximum number of samples of the displacement that are drawn; velocities of the theory.
 MAX_DOTS, THEORY_POINTS = 20_000, 30

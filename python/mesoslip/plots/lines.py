@@ -7,11 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from mesoslip.array_types import Array
 from mesoslip.output.arrays import Tree
 from mesoslip.output.samples import Samples, samples
 from mesoslip.plots.extent import MAX_PARTS, Extent
-
-Array = NDArray[np.float64]
 
 # Samples that are read at once.
 BLOCK = 2**20

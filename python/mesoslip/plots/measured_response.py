@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
 
 from mesoslip.analysis.experiment_stages import Experiment
 from mesoslip.analysis.rate_and_state import Fit, fit_laws, preferred_law, records_of
 from mesoslip.analysis.response import response_of, rows_of
+from mesoslip.array_types import Array
 from mesoslip.errors import RunError
 from mesoslip.output.arrays import Arrays, Tree
 from mesoslip.plots.logarithmic import logarithmic
@@ -16,8 +16,6 @@ from mesoslip.plots.printing import is_narrow
 from mesoslip.plots.response_record import draw_record, fit_label, force_unit, title_record
 from mesoslip.plots.style import POINTS, RED, Canvas, canvas
 from mesoslip.quantities import Scale, scale_for, with_error
-
-Array = NDArray[np.float64]
 
 # Factor between the velocities of steps and the ends of their axis.
 MARGIN = 3.0
@@ -51,8 +49,7 @@ def _horizontal(experiment: Experiment, found: Fit) -> Array:
     """Displacement of the load point at the points of a fit [m]."""
     points = found.law.points
     sign = experiment.stages[0].direction or 1.0
-    drive: Array = sign * np.interp(points.time + points.start, experiment.time, experiment.drive)
-    return drive
+    return sign * np.interp(points.time + points.start, experiment.time, experiment.drive)
 
 
 def _draw_fit(axes: Axes, experiment: Experiment, found: Fit, scale: Scale) -> None:

@@ -22,11 +22,10 @@ from matplotlib.text import Text
 from numpy.typing import NDArray
 from PIL import Image
 
+from mesoslip.array_types import Array
 from mesoslip.errors import FileError
 from mesoslip.output.targets import written_whole
 from mesoslip.plots.style import RED
-
-Array = NDArray[np.float64]
 
 ENDINGS = (".gif", ".mp4")
 MAX_FRAMES = 100

@@ -2,27 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from matplotlib.ticker import MaxNLocator, ScalarFormatter
 
+from mesoslip.array_types import DataTree
 from mesoslip.configuration.units import from_cf_units
 from mesoslip.plots.key_names import symbol_or_name
 from mesoslip.plots.printing import UNLETTERED, is_narrow
 from mesoslip.plots.style import BLUE, Canvas
 from mesoslip.quantities import Scale, scale_for
 
-if TYPE_CHECKING:
-    import xarray as xr
-
 # Maximum number of draws of a pair of parameters that are shown.
 MAX_POINTS = 1500
-
-
-def _scale(draws: xr.DataArray) -> Scale:
-    """The unit that suits the median of a parameter."""
-    return scale_for(float(np.median(np.abs(draws.values))), from_cf_units(draws.attrs["units"]))
 
 
 def _label(name: str, scale: Scale) -> str:
@@ -30,12 +21,14 @@ def _label(name: str, scale: Scale) -> str:
     return scale.label(symbol_or_name(name))
 
 
-def draw_pairs(figure: Canvas, place: object, tree: xr.DataTree) -> None:
+def draw_pairs(figure: Canvas, place: object, tree: DataTree) -> None:
     """Draw pairs of parameters, and on the diagonal the density of each with that of its prior."""
     group, prior = tree["posterior"].to_dataset(), tree["prior"].to_dataset()
     names = [str(name) for name in group.data_vars]
     grid = place.subgridspec(len(names), len(names))  # type: ignore[attr-defined]
-    scales = {name: _scale(group[name]) for name in names}
+    medians = {name: float(np.median(np.abs(group[name].values))) for name in names}
+    units = {name: from_cf_units(group[name].attrs["units"]) for name in names}
+    scales = {name: scale_for(medians[name], units[name]) for name in names}
     draws = {name: group[name].values.ravel() / scales[name].size for name in names}
     thin = slice(None, None, max(1, len(draws[names[0]]) // MAX_POINTS))
     for row, below in enumerate(names):

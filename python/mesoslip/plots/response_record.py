@@ -13,11 +13,10 @@ from matplotlib.transforms import offset_copy
 from numpy.typing import NDArray
 
 from mesoslip.analysis.experiment_stages import Experiment
+from mesoslip.array_types import Array
 from mesoslip.output.arrays import Tree
 from mesoslip.plots.style import BLUE, axes_width, titles, wrapped
 from mesoslip.quantities import Scale, scale_for, with_unit
-
-Array = NDArray[np.float64]
 
 # Samples of the record at equal intervals of time, and at equal intervals of displacement.
 MAX_DOTS = 20_000

@@ -3,22 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
+from mesoslip.array_types import Array, DataArray
 from mesoslip.configuration.units import from_cf_units
 from mesoslip.plots.key_names import name_of, symbol_or_name
 from mesoslip.plots.logarithmic import logarithmic
 from mesoslip.plots.style import BLUE, RED, axes_height, axes_width, characters, wrapped
 from mesoslip.quantities import Scale, number, scale_for
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-Array = NDArray[np.float64]
 
 # Dimension of the directions, up and down again.
 DIRECTION = "direction"
@@ -52,7 +48,7 @@ class SweptKey:
     """The symbol with its unit, where there is no room for the label."""
 
     @classmethod
-    def of(cls, coordinate: xr.DataArray) -> SweptKey:
+    def of(cls, coordinate: DataArray) -> SweptKey:
         """The axis of a coordinate of a sweep."""
         values, name = coordinate.values, str(coordinate.name)
         if values.dtype.kind not in "fiu":
@@ -129,7 +125,7 @@ def spans_decades(values: Array) -> bool:
     return bool(known.size and known.min() > 0 and known.max() > LOGARITHMIC_MEASURE * known.min())
 
 
-def scale_of(data: xr.DataArray) -> Scale:
+def scale_of(data: DataArray) -> Scale:
     """The unit that suits the values of a key or a measure."""
     values = np.abs(data.values[np.isfinite(data.values)])
     unit = from_cf_units(data.attrs.get("units", "1"))

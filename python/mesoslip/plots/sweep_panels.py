@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -10,15 +10,11 @@ from matplotlib.colors import BoundaryNorm, ListedColormap, LogNorm, Normalize
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
+from mesoslip.array_types import Array, Dataset
 from mesoslip.plots.boundaries import REGIME
 from mesoslip.plots.logarithmic import label_powers, logarithmic
 from mesoslip.plots.style import POINTS
 from mesoslip.plots.sweep_axis import DIRECTION, DIRECTION_STYLES, SweptKey, spans_decades
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-Array = NDArray[np.float64]
 
 # Smooth, stick-slip, irregular, transient, which differ in lightness; further choices.
 CHOICE_COLORS = ("#a3cbe5", "#cc6677", "#f5e9b0", "#a5a5a5", "#5aa382", "#84669e")
@@ -65,7 +61,7 @@ class Measured(NamedTuple):
         return _different(self.values)
 
 
-def measured(data: xr.Dataset, name: str, label: str, unit: float) -> Measured:
+def measured(data: Dataset, name: str, label: str, unit: float) -> Measured:
     """A measure of a sweep in a unit [SI]."""
     measure = data[name].transpose(..., "realization")
     choices = tuple(measure.attrs.get("flag_meanings", "").replace("_", "-").split())
@@ -122,7 +118,7 @@ def _name_rows(axes: Axes, one: Measured) -> None:
     axes.set_ylim(-0.5, len(one.rows) - 0.5)
 
 
-def draw_directions(axes: Axes, data: xr.Dataset, one: Measured, key: SweptKey) -> list[Line2D]:
+def draw_directions(axes: Axes, data: Dataset, one: Measured, key: SweptKey) -> list[Line2D]:
     """Draw a measure up and down one key; returns lines for a legend.
 
     The directions are the dimension before that of the realizations.

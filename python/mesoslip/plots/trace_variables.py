@@ -7,7 +7,7 @@ import numpy as np
 from mesoslip.configuration.units import from_cf_units
 from mesoslip.output.access import config_of, is_measured
 from mesoslip.output.arrays import Tree
-from mesoslip.output.variables import LOADED, TRACE
+from mesoslip.output.variables import LOADED, TRACE, force_among
 
 NAMES = {
     "spring_force": "spring force",
@@ -39,9 +39,5 @@ def _waits(tree: Tree) -> bool:
 
 def force_of(tree: Tree) -> str:
     """The force that shows the motion: for an elastic slider the mean elastic force."""
-    return "elastic_force" if "elastic_force" in tree.data_vars else driving_force_of(tree)
-
-
-def driving_force_of(tree: Tree) -> str:
-    """The force at the drive, or the friction coefficient of a measured trace without forces."""
-    return "spring_force" if "spring_force" in tree.data_vars else "friction_coefficient"
+    names = tree.data_vars
+    return "elastic_force" if "elastic_force" in names else force_among(names)

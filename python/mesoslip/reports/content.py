@@ -7,19 +7,16 @@ import io
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import matplotlib as mpl
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
+from mesoslip.array_types import DataTree
 from mesoslip.configuration.config import Config
 from mesoslip.errors import FileError
 from mesoslip.output.access import config_of
 from mesoslip.plots.style import Canvas, styled
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 # Intervals of a line in each of which the page shows the extremes, fewer than in print.
 PARTS = 1000
@@ -36,7 +33,7 @@ class Subject:
     """An output in a report, with its name on the page."""
 
     name: str
-    tree: xr.DataTree
+    tree: DataTree
 
     @property
     def config(self) -> Config:

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from functools import singledispatch
 from typing import TYPE_CHECKING
 
+from mesoslip.array_types import DataTree
 from mesoslip.configuration.config import Config
 from mesoslip.configuration.contacts.tables.ageing import Ageing
 from mesoslip.configuration.contacts.tables.interaction import Interaction
@@ -32,8 +33,6 @@ from mesoslip.output.kinds import kind_of
 from mesoslip.quantities import column, with_unit
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from mesoslip.inference.posterior import Row
 
 MODEL = "earthquake-like model of a multicontact interface [@braun2009; @braun2011; @braun2015]"
@@ -59,14 +58,14 @@ def quantity(value: float, unit: str) -> str:
     return with_unit(value, unit, DIGITS)
 
 
-def run_method(tree: xr.DataTree, config: Config) -> Iterator[str]:
+def run_method(tree: DataTree, config: Config) -> Iterator[str]:
     yield from _engine(config)
     yield from model(config, _run_length(config))
     yield from _early_end(tree, config)
     yield from _accuracy(tree, config)
 
 
-def curve_method(tree: xr.DataTree, config: Config) -> Iterator[str]:
+def curve_method(tree: DataTree, config: Config) -> Iterator[str]:
     error = ""
     if "error" in tree.attrs:
         size = f"{float(tree.attrs['error']):.0e}".replace("e-0", "e-")
@@ -88,7 +87,7 @@ SETTLED = {
 }
 
 
-def cycle_method(tree: xr.DataTree, config: Config) -> Iterator[str]:
+def cycle_method(tree: DataTree, config: Config) -> Iterator[str]:
     yield from _engine(config)
     is_continued = tree.attrs.get("continued") == "true"
     start = ", from the state of an earlier cycle" if is_continued else ""
@@ -99,7 +98,7 @@ def cycle_method(tree: xr.DataTree, config: Config) -> Iterator[str]:
     yield from model(config, has_start=not is_continued)
 
 
-def branches_method(tree: xr.DataTree, config: Config) -> Iterator[str]:
+def branches_method(tree: DataTree, config: Config) -> Iterator[str]:
     yield from _engine(config)
     yield (
         "At each value it was iterated from one passage of the spring force through a section "
@@ -109,7 +108,7 @@ def branches_method(tree: xr.DataTree, config: Config) -> Iterator[str]:
     yield from model(config)
 
 
-def lyapunov_method(tree: xr.DataTree, config: Config) -> Iterator[str]:
+def lyapunov_method(tree: DataTree, config: Config) -> Iterator[str]:
     yield from _engine(config)
     yield (
         f"The largest Lyapunov exponent is the rate at which {tree.sizes['twin']} twins depart "
@@ -118,7 +117,7 @@ def lyapunov_method(tree: xr.DataTree, config: Config) -> Iterator[str]:
     yield from model(config, _run_length(config))
 
 
-def steady_method(tree: xr.DataTree, config: Config) -> Iterator[str]:
+def steady_method(tree: DataTree, config: Config) -> Iterator[str]:
     yield (
         f"The force of steady sliding of the {MODEL}, and its linear stability, were computed "
         "with mesoslip [@mesoslip] for infinitely many contacts, from the survival of contacts "
@@ -132,7 +131,7 @@ def steady_method(tree: xr.DataTree, config: Config) -> Iterator[str]:
         yield f"Velocities are from {' to '.join(ends)}."
 
 
-def onset_method(_: xr.DataTree, config: Config) -> Iterator[str]:
+def onset_method(_: DataTree, config: Config) -> Iterator[str]:
     drag = ""
     if config.contacts.drag_rate:
         drag = f" and is dragged at the rate η = {quantity(config.contacts.drag_rate, '1/s')}"
@@ -144,7 +143,7 @@ def onset_method(_: xr.DataTree, config: Config) -> Iterator[str]:
     yield from model(config, is_slow=True)
 
 
-def sweep_method(tree: xr.DataTree, config: Config) -> Iterator[str]:
+def sweep_method(tree: DataTree, config: Config) -> Iterator[str]:
     # Others are realizations, directions and numbers of samples.
     keys = ", ".join(str(name) for name in tree.coords if "." in str(name))
     count = tree.sizes.get("realization", 1)
@@ -155,7 +154,7 @@ def sweep_method(tree: xr.DataTree, config: Config) -> Iterator[str]:
     yield f"Varied were {keys}{each}; values above of these keys are those of the base."
 
 
-def fit_method(tree: xr.DataTree, config: Config) -> Iterator[str]:
+def fit_method(tree: DataTree, config: Config) -> Iterator[str]:
     """Sentences on a fit, with the medians of its free keys."""
     from mesoslip.inference import posterior
 
@@ -195,7 +194,7 @@ def fit_method(tree: xr.DataTree, config: Config) -> Iterator[str]:
 
 
 # Sentences on the method of each kind of output.
-METHODS: dict[str, Callable[[xr.DataTree, Config], Iterator[str]]] = {
+METHODS: dict[str, Callable[[DataTree, Config], Iterator[str]]] = {
     "run": run_method,
     "sweep": sweep_method,
     "cycle": cycle_method,
@@ -209,7 +208,7 @@ METHODS: dict[str, Callable[[xr.DataTree, Config], Iterator[str]]] = {
 }
 
 
-def computed_method(tree: xr.DataTree, config: Config) -> str:
+def computed_method(tree: DataTree, config: Config) -> str:
     """The method of an output that was computed."""
     return " ".join(METHODS[kind_of(tree)](tree, config))
 
@@ -221,7 +220,7 @@ def _estimate(row: Row) -> str:
     return f"{row.key} {median} {shown.scale.name} ({low} to {high})".replace("  ", " ")
 
 
-def rates_method(tree: xr.DataTree) -> Iterator[str]:
+def rates_method(tree: DataTree) -> Iterator[str]:
     """A sentence on a posterior of rates and states."""
     laws = " and ".join(str(tree.attrs["laws"]).split("\n"))
     yield (
@@ -233,7 +232,7 @@ def rates_method(tree: xr.DataTree) -> Iterator[str]:
     )
 
 
-def measured_method(tree: xr.DataTree) -> str:
+def measured_method(tree: DataTree) -> str:
     """The method of a measured trace, or of a posterior of its rates and states."""
     if kind_of(tree) == "rates":
         return " ".join(rates_method(tree))
@@ -516,7 +515,7 @@ def _motion(drive: Drive) -> str:
     return f"The drive has {count} stage{'s' * (count > 1)}"
 
 
-def _accuracy(tree: xr.DataTree, config: Config) -> Iterator[str]:
+def _accuracy(tree: DataTree, config: Config) -> Iterator[str]:
     """Sentences on the integration of the slider, and on its error."""
     method = config.slider.solver_name(config)
     if method in {"adams", "bdf"}:

@@ -12,8 +12,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from mesoslip.array_types import Array
 from mesoslip.errors import RunError
-from mesoslip.simulation.kernel import Array, Words
+from mesoslip.simulation.kernel import Words
 
 NAME_WORDS, HEADING_WORDS = 4, 7
 KIND_SECTION, KIND_REAL, KIND_INTEGER = 0, 1, 2

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mesoslip.simulation.kernel import Array
+from mesoslip.array_types import Array
 from mesoslip.simulation.recorded_tables import ENERGY_COLUMNS
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ def share_of_work(config: Config, energies: Array, term: str) -> Array:
 
 
 def largest(values: Array) -> float:
-    """The value with the largest size; NaN if there is none that is known."""
+    """The value with the largest size; NaN if none is known."""
     known = values[~np.isnan(values)]
     return float(known[np.argmax(np.abs(known))]) if known.size else math.nan
 

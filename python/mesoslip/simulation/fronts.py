@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from mesoslip.array_types import Array
 
 FRONT_COLUMNS = (
     *("event", "start_time", "end_time", "start_position", "end_position", "length", "speed"),
@@ -109,20 +109,11 @@ class Basin(NamedTuple):
 
 
 class FrontFinder:
-    """Finds the fronts of one realization.
+    """Finds the fronts of one realization, from the number and distance [m] of its blocks.
 
-    Parameters
-    ----------
-    blocks
-        Number of blocks.
-    spacing
-        Distance of blocks [m].
-    block_time
-        Time of sound over a block [s]: nucleations that differ by less are one.
-    quiet_time
-        Time without fast motion after which a slip is over [s].
-    strength
-        Static forces [N] of blocks, numbered from 1, at times [s].
+    Nucleations that differ by less than the time of sound over a block [s] are one, and a slip is
+    over after the quiet time without fast motion [s]. The strength is that of blocks, numbered from
+    1, at times [s].
     """
 
     def __init__(

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip import _core
+from mesoslip.array_types import Array
 from mesoslip.configuration.kernel_parameters import Named, Parameters, named, padded
 from mesoslip.errors import NoMemoryError, RunError
 from mesoslip.memory_limit import RESERVE, is_memory_short
 
-Array = NDArray[np.float64]
 Words = NDArray[np.int64]
 
 # Maximum number of names in a list.

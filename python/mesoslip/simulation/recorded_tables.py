@@ -15,12 +15,11 @@ from typing import IO
 import numpy as np
 from numpy.typing import NDArray
 
+from mesoslip.array_types import Array
 from mesoslip.errors import RunError, shown
 from mesoslip.execution.regular_files import regular_descriptor
 from mesoslip.simulation.fronts import FRONT_COLUMNS
 from mesoslip.simulation.kernel import name_list
-
-Array = NDArray[np.float64]
 
 # Columns of the tables, as the kernels state them.
 TRACE_COLUMNS = name_list("trace")

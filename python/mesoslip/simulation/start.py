@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from mesoslip.array_types import Array
 from mesoslip.configuration.kernel_parameters import Parameters
 from mesoslip.errors import ConfigError, Problem
 from mesoslip.simulation.archive import Archive
-from mesoslip.simulation.kernel import Array, Kernel, Progress, Words
+from mesoslip.simulation.kernel import Kernel, Progress, Words
 from mesoslip.simulation.kernel_setup import KernelSetup
 from mesoslip.simulation.recorded_tables import BLOCK_NUMBERS, COLUMNS, ENERGY_COLUMNS
 

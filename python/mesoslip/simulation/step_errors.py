@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mesoslip.simulation.kernel import Array
+from mesoslip.array_types import Array
 from mesoslip.simulation.recorded_tables import SLIP_COLUMNS, TRACE_COLUMNS
 
 # Steps of the coarse run over those of the run itself, and their errors less 1.

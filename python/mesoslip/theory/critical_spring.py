@@ -9,18 +9,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import singledispatch
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mesoslip.array_types import Array, Complex
 from mesoslip.configuration.sliders.base import SliderTable
 from mesoslip.configuration.sliders.layered import LayeredSlider
 from mesoslip.configuration.sliders.rigid import RigidSlider
 from mesoslip.theory.sliders import chain_stiffness
-
-Array = NDArray[np.float64]
-Complex = NDArray[np.complexfloating[Any, Any]]
 
 # Growth rate over the frequency of the slider, Ω_S/π, below which a perturbation does not grow.
 NO_GROWTH = 1e-7

@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mesoslip.array_types import Dataset, DataTree
 from mesoslip.output.inputs import ConfigLike, as_config
 from mesoslip.output.provenance import program_attributes
 from mesoslip.output.variables import CRITICAL, CURVE, STRETCHES
 from mesoslip.theory.contacts import contact_theory
 from mesoslip.theory.force_curve import ForceCurve
-
-if TYPE_CHECKING:
-    import xarray as xr
-
 
 # Units and meanings of the summary of a curve.
 SUMMARY = {
@@ -58,7 +54,7 @@ SUMMARY = {
 DENSITY_POINTS, WIDTHS_BELOW = 2001, 6
 
 
-def curve(config: ConfigLike) -> xr.DataTree:
+def curve(config: ConfigLike) -> DataTree:
     """The force curve F(X) of the master equation, and its elastic instability.
 
     Returns
@@ -83,7 +79,7 @@ def curve(config: ConfigLike) -> xr.DataTree:
     return curve_tree(ForceCurve(checked))
 
 
-def curve_tree(curve: ForceCurve) -> xr.DataTree:
+def curve_tree(curve: ForceCurve) -> DataTree:
     """A force curve as an output.
 
     Root: F, F', K_c and Γ over ``displacement``, with V_eff if a drive displacement is given;
@@ -126,7 +122,7 @@ def curve_tree(curve: ForceCurve) -> xr.DataTree:
     return xr.DataTree(root, children=children)
 
 
-def _densities(curve: ForceCurve) -> xr.Dataset:
+def _densities(curve: ForceCurve) -> Dataset:
     """Q(x; X) at the displacements that the configuration asks for."""
     import xarray as xr
 

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import abc
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mesoslip.array_types import Complex
 from mesoslip.errors import ConfigError, MesoslipError, Problem
 
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
-
-Complex = NDArray[np.complexfloating[Any, Any]]
 
 
 class DelayLaw(abc.ABC):

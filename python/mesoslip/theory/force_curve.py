@@ -15,10 +15,11 @@ from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy import optimize
 from scipy.interpolate import BPoly
 
+from mesoslip.array_types import Array
 from mesoslip.errors import ConfigError, Problem
 from mesoslip.theory.contacts import contact_theory
 from mesoslip.theory.lives import law_parameters, newborn_stretch, scales
@@ -30,7 +31,6 @@ from mesoslip.theory.stretch_density import stretch_density
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
 
-Array = NDArray[np.float64]
 
 WITHOUT_NEWBORN_WIDTH = (
     'has a force curve for coupling = "equal" only, with thresholds of which hardly any is below '

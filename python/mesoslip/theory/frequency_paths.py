@@ -9,17 +9,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mesoslip.array_types import Array, Complex
 from mesoslip.configuration.sliders.base import SliderTable
 from mesoslip.theory.critical_spring import balancing_spring, outweighed_from
 from mesoslip.theory.sliders import dynamic_stiffness
-
-Array = NDArray[np.float64]
-Complex = NDArray[np.complexfloating[Any, Any]]
 
 # Points of a path for each turn of the response.
 POINTS_A_TURN = 10
@@ -53,18 +50,9 @@ class Parts(NamedTuple):
 
 
 class Turns(NamedTuple):
-    """The times with which the response turns.
-
-    Attributes
-    ----------
-    period
-        Mean time from birth to birth [s].
-    until
-        Frequency up to which lives are alike enough for the response to turn with it [1/s];
-        infinite if it is not known.
-    delay
-        Delay of all contacts [s]; 0 where each has its own.
-    """
+    """The times with which the response turns: mean time from birth to birth [s], the frequency up
+    to which lives are alike enough for the response to turn with it [1/s], infinite if it is not
+    known, and the delay of all contacts [s], 0 where each has its own."""
 
     period: float
     until: float

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import math
 from functools import cache, cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mesoslip.array_types import Array, Complex
 from mesoslip.configuration.threshold_law import ThresholdLaw
 from mesoslip.configuration.threshold_laws import LAWS
 from mesoslip.configuration.threshold_laws.table import law_cells
@@ -21,8 +21,6 @@ from mesoslip.theory.table_lives import TableLives, sums_of_panels, table_lives
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
 
-Array = NDArray[np.float64]
-Complex = NDArray[np.complexfloating[Any, Any]]
 
 # Panels over the lives, and points of each: a law is a polynomial in each panel.
 PANELS, POINTS = 100, 10

@@ -11,35 +11,24 @@ import abc
 import math
 from collections.abc import Iterator
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mesoslip.array_types import Array, Complex
 from mesoslip.configuration import arguments
 from mesoslip.errors import ConfigError, Problem, RunError
 from mesoslip.quantities import percent, with_unit
 from mesoslip.theory.contacts.steady import newborn_problems, steady_problems
-from mesoslip.theory.critical_spring import (
-    NO_GROWTH,
-    critical_spring,
-    has_critical_spring,
-)
+from mesoslip.theory.critical_spring import NO_GROWTH, critical_spring, has_critical_spring
 from mesoslip.theory.delays import delay_law
-from mesoslip.theory.frequency_paths import (
-    MAX_POINTS,
-    Parts,
-    Turns,
-    counting_path,
-    search_path,
-)
+from mesoslip.theory.frequency_paths import MAX_POINTS, Parts, Turns, counting_path, search_path
 from mesoslip.theory.sliders import dynamic_stiffness, stability_problems
 
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
 
-Array = NDArray[np.float64]
-Complex = NDArray[np.complexfloating[Any, Any]]
 
 # Maximum change of the argument between two points of the path along which roots are counted, and
 # maximum number of halvings of an interval.
@@ -64,20 +53,8 @@ NO_AMPLITUDE = "Linear theory gives no amplitude"
 
 
 class LinearStability(abc.ABC):
-    """Steady sliding of a configuration, and the growth of small perturbations of it.
-
-    Parameters
-    ----------
-    config
-        The configuration.
-    velocity
-        Velocity [m/s]; that of the drive by default.
-
-    Raises
-    ------
-    ConfigError
-        If there is no theory for the contacts or the slider, or there is no velocity.
-    """
+    """Steady sliding of a configuration at a velocity [m/s], by default that of the drive, and the
+    growth of small perturbations of it."""
 
     def __init__(self, config: Config, velocity: float | None = None) -> None:
         contacts = config.contacts

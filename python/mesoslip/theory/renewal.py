@@ -8,16 +8,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import special
 from scipy.interpolate import BPoly
 
 from mesoslip import _core
+from mesoslip.array_types import Array
 from mesoslip.configuration.kernel_parameters import Parameters, named
 from mesoslip.execution.interruptible import interruptible
 from mesoslip.simulation.kernel import checked
-
-Array = NDArray[np.float64]
 
 # Points of collocation in a panel: the force converges with the order of this number.
 POINTS = 12

@@ -13,15 +13,14 @@ from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import fft, optimize, special
 
+from mesoslip.array_types import Array
 from mesoslip.configuration.kernel_parameters import Parameters
 
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
 
-Array = NDArray[np.float64]
 
 # Cells of the smoothed law, bins of the samples for each, and bandwidths beyond the samples.
 CELLS, BINS, BEYOND = 3000, 8, 5

@@ -12,17 +12,15 @@ from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 from scipy import optimize
 
 from mesoslip import _core
+from mesoslip.array_types import Array
 from mesoslip.errors import ConfigError, Problem, RunError
 from mesoslip.output.inputs import ConfigLike, as_config
 from mesoslip.output.provenance import program_attributes
 from mesoslip.output.variables import ONSET
 from mesoslip.theory.force_curve import ForceCurve
-
-Array = NDArray[np.float64]
 
 # Units and meanings of the summary of the onset.
 SUMMARY = {
@@ -61,17 +59,10 @@ SAMPLES = 200
 
 @dataclass(frozen=True)
 class Onset:
-    """A solution of S46 or S47; arrays over the samples.
+    """A solution of S46 or S47; arrays over the samples of τ, x, x′ and its running mean.
 
-    Attributes
-    ----------
-    time, displacement, velocity, mean_velocity
-        τ, x, x′ and its running mean.
-    force_drop
-        ΔF_d/F_s = D1 τ - x, negative: the change of the spring force.
-    ended
-        Whether the solution reached its end: S46 the end of its expansion, S47 the minimum spring
-        force.
+    The force drop is ΔF_d/F_s = D1 τ - x, negative: the change of the spring force. S46 ends at the
+    end of its expansion, S47 at the minimum spring force.
     """
 
     time: Array

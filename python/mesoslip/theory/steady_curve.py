@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from mesoslip.array_types import Array
 from mesoslip.errors import ConfigError, Problem
 from mesoslip.output.provenance import program_attributes
 from mesoslip.output.variables import STEADY
@@ -24,7 +24,6 @@ from mesoslip.theory.steady_sliding import sliding_of
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
 
-Array = NDArray[np.float64]
 
 # Decades of velocities on either side, and velocities of each.
 DECADES, VELOCITIES_A_DECADE = 3, 2

@@ -28,6 +28,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mesoslip.array_types import Array
 from mesoslip.errors import ConfigError, Problem
 from mesoslip.theory.contacts import contact_theory
 from mesoslip.theory.sliders import row_scales
@@ -35,7 +36,6 @@ from mesoslip.theory.sliders import row_scales
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
 
-Array = NDArray[np.float64]
 
 # Times of a front over a block, in units of that of sound, between which speeds are sought, and
 # their number in a decade.

@@ -20,20 +20,8 @@ MAX_STIFFNESS, MIN_STIFFNESS = 16.0, 1e-4
 
 
 def sliding_of(config: Config, velocity: float | None = None) -> LinearStability:
-    """Steady sliding of a configuration, by the theory that its contacts have.
-
-    Parameters
-    ----------
-    config
-        The configuration.
-    velocity
-        Velocity [m/s]; that of the drive by default.
-
-    Raises
-    ------
-    ConfigError
-        If there is no theory for the contacts or the slider, or there is no velocity.
-    """
+    """Steady sliding of a configuration at a velocity [m/s], by default that of the drive, by the
+    theory that its contacts have."""
     return contact_theory(config).sliding(velocity)
 
 
@@ -157,17 +145,8 @@ def _first_stable_stiffness(
 
 
 class StiffnessLimits(NamedTuple):
-    """Stiffnesses of the spring above which steady sliding is linearly stable.
-
-    Attributes
-    ----------
-    velocity
-        Velocity of sliding [m/s], that of the drive.
-    in_phase
-        With delay [N/m].
-    dephased
-        The same for dephased contacts [N/m]; None if that is no smaller.
-    """
+    """Stiffnesses of the spring [N/m] above which sliding at the velocity of the drive [m/s] is
+    linearly stable: with delay, and for dephased contacts, None if that is no smaller."""
 
     velocity: float
     in_phase: float

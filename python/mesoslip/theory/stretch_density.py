@@ -12,16 +12,14 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import special
 
+from mesoslip.array_types import Array
 from mesoslip.configuration.threshold_law import ThresholdLaw
 from mesoslip.theory.table_lives import TableLives, table_lives
 
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
-
-Array = NDArray[np.float64]
 
 
 def stretch_density(
@@ -124,8 +122,7 @@ class _Density:
 
                 def attached(threshold: Array, gap: Array = gap) -> Array:
                     birth = moved - gap[:, None] + back / np.sqrt(threshold)
-                    rate: Array = np.nan_to_num(breaks(birth))
-                    return rate
+                    return np.nan_to_num(breaks(birth))
 
                 density = self._average_between(lower, np.maximum(lower, upper), attached)
                 root = 0.5 * (shift + math.sqrt(shift**2 + 4 * back))

@@ -13,10 +13,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from mesoslip.array_types import Array
+
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
 
-Array = NDArray[np.float64]
 
 # Numbers of stretches times cells that are averaged at once.
 MAX_TOGETHER = 2_000_000
@@ -71,8 +72,7 @@ class TableLives(NamedTuple):
     def above(self, stretch: Array) -> Array:
         """Probability that contacts of each cell break above stretches (stretches, cells)."""
         part = (self.high - stretch[:, None]) / (self.high - self.low)
-        values: Array = self.share * np.clip(part, 0, 1)
-        return values
+        return self.share * np.clip(part, 0, 1)
 
     def newborn_density(
         self, stretch: Array, moved: float, shift: float, breaks: Callable[[Array], Array]

@@ -17,11 +17,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mesoslip.array_types import Array, Complex, Dataset
 from mesoslip.configuration import arguments
 from mesoslip.configuration.config import Config
 from mesoslip.errors import ConfigError, Problem
@@ -29,12 +29,6 @@ from mesoslip.output.variables import TRACK_RESPONSE
 from mesoslip.theory.contacts.base import KNOWN_KEYS
 from mesoslip.theory.delays import delay_law
 from mesoslip.theory.thresholds import threshold_quadrature
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-Array = NDArray[np.float64]
-Complex = NDArray[np.complexfloating[Any, Any]]
 
 # Quadrature over thresholds: panels and points of each.
 PANELS, POINTS = 32, 8
@@ -176,7 +170,7 @@ def _problems(config: Config) -> Iterator[Problem]:
         yield Problem("", "contacts.reattach", "without it there is no steady sliding", False)
 
 
-def track_dataset(linear: TrackResponse) -> xr.Dataset:
+def track_dataset(linear: TrackResponse) -> Dataset:
     """Response and spectra over the wavenumber."""
     import xarray as xr
 

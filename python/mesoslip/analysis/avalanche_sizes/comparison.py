@@ -20,7 +20,8 @@ from mesoslip.analysis.avalanche_sizes.laws import (
 )
 from mesoslip.analysis.avalanche_sizes.power_law import PowerLawFit
 from mesoslip.analysis.avalanche_sizes.sums import Rule, sum_rule
-from mesoslip.analysis.avalanche_sizes.tally import Array, Tally, tally_of
+from mesoslip.analysis.avalanche_sizes.tally import Tally, tally_of
+from mesoslip.array_types import Array
 
 # Powers of the size in stretched exponentials, and minimum sigma of lognormal laws: sums over
 # steeper ones would need more nodes.

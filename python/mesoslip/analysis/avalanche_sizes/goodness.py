@@ -10,7 +10,8 @@ import scipy
 
 from mesoslip.analysis.avalanche_sizes.laws import Law, likeliest_law, uncut_law
 from mesoslip.analysis.avalanche_sizes.sums import sum_rule
-from mesoslip.analysis.avalanche_sizes.tally import Array, Tally
+from mesoslip.analysis.avalanche_sizes.tally import Tally
+from mesoslip.array_types import Array
 
 # Bins of chi-squared in a factor of ten, and minimum expected number of sizes in each.
 BINS = 10

@@ -14,7 +14,8 @@ import numpy as np
 import scipy
 
 from mesoslip.analysis.avalanche_sizes.sums import MIN_RATE, Rule, sum_rule
-from mesoslip.analysis.avalanche_sizes.tally import Array, Tally
+from mesoslip.analysis.avalanche_sizes.tally import Tally
+from mesoslip.array_types import Array
 
 # Minimum exponent: sums of laws that rise more steeply would need more nodes.
 MIN_EXPONENT = -20.0
@@ -131,8 +132,7 @@ def _prior(form: Form, count: int) -> Array:
 
 def _information(law: Law, count: int) -> Array:
     """Information of one size about the parameters, with that of the prior."""
-    information: Array = law.moments.covariance + np.diag(_prior(law.form, count))
-    return information
+    return law.moments.covariance + np.diag(_prior(law.form, count))
 
 
 def _moments(rule: Rule, features: Array, parameters: Array) -> _Moments:

@@ -19,7 +19,8 @@ from mesoslip.analysis.avalanche_sizes.laws import (
     log_posterior,
     uncut_law,
 )
-from mesoslip.analysis.avalanche_sizes.tally import MIN_DIFFERENT, Array, Tally, tally_of
+from mesoslip.analysis.avalanche_sizes.tally import MIN_DIFFERENT, Tally, tally_of
+from mesoslip.array_types import Array
 from mesoslip.errors import MesoslipError
 
 # Significance below which a cutoff is resolved, and p-value below which a fit is rejected.
@@ -213,33 +214,11 @@ def fit_power_law(
     logarithmic bins, which weighs tails more. At most MAX_TESTED sizes, chosen at random, are
     tested.
 
-    Parameters
-    ----------
-    sizes
-        Positive integers, of any shape.
-    min_size
-        Sizes below it are left out. By default: of ten in a decade, the first from which the sizes
-        in bins agree with the best form, times BEYOND, as far as MIN_ABOVE sizes and a ratio of
-        MIN_RANGE remain above. If no form agrees, the one of the minimum distance.
-    max_size
-        Sizes above it are left out, and the law ends there.
-    forms
-        Forms of the law that are averaged.
-    replicas
-        Number of synthetic samples of the test.
-    seed
-        Seed of the test.
-
-    Returns
-    -------
-    PowerLawFit or None
-        None if there are fewer than MIN_COUNT sizes between the limits, or fewer than MIN_DIFFERENT
-        different ones.
-
-    Raises
-    ------
-    MesoslipError
-        If a size or ``min_size`` is not a positive integer.
+    By default sizes are left out below the first, of ten in a decade, from which the sizes in bins
+    agree with the best form, times BEYOND, as far as MIN_ABOVE sizes and a ratio of MIN_RANGE
+    remain above. If no form agrees, it is the one of the minimum distance. The law ends at a
+    maximum size that is given. None if there are fewer than MIN_COUNT sizes between the limits, or
+    fewer than MIN_DIFFERENT different ones.
 
     References
     ----------

@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 import scipy  # its parts are loaded when they are used
 
-from mesoslip.analysis.avalanche_sizes.tally import Array
+from mesoslip.array_types import Array
 
 # Maximum length of blocks that are summed integer by integer, and nodes of longer blocks.
 DIRECT = 16

@@ -9,9 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mesoslip.array_types import Array
 from mesoslip.errors import MesoslipError
-
-Array = NDArray[np.float64]
 
 # Minimum number of sizes, and of distinct ones, for the fit of a law.
 MIN_COUNT = 10

@@ -2,15 +2,15 @@
 
 from mesoslip.analysis.events.channel import Emissions, emissions_of
 from mesoslip.analysis.events.laws import BValue, Omori, b_value, omori
-from mesoslip.analysis.events.summary import EventSummary, check_catalogue, events, events_of
+from mesoslip.analysis.events.summary import CATALOGUES, EventSummary, events, events_of
 
 __all__ = [
+    "CATALOGUES",
     "BValue",
     "Emissions",
     "EventSummary",
     "Omori",
     "b_value",
-    "check_catalogue",
     "emissions_of",
     "events",
     "events_of",

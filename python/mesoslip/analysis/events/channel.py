@@ -6,18 +6,15 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mesoslip.analysis.noise.levels import NORMAL_MEDIAN
+from mesoslip.array_types import Array
 from mesoslip.errors import FileError
 from mesoslip.output.arrays import Tree
-
-Array = NDArray[np.float64]
 
 CHANNEL = "acoustic_emission"
 # Threshold over the standard deviation of the noise: chance exceeds it once in 10^9 samples.
 THRESHOLD = 6.0
-# Median of the absolute value of a standard normal deviate.
-NORMAL_MEDIAN = 0.6744897501960817
 # Maximum number of values of a trigger, and samples below the threshold that end an event.
 TRIGGER_VALUES, DEAD_SAMPLES = 3, 10
 
@@ -36,13 +33,12 @@ class Emissions:
     is_trigger: bool
 
 
-def emissions_of(tree: Tree, threshold: float | None = None, dead_time: float = 0.0) -> Emissions:
+def emissions_of(tree: Tree, threshold: float | None = None) -> Emissions:
     """Events of the channel of an output.
 
     A channel of two or three values is a trigger, whose events are between its edges. Of others the
     distance from the median is an event where it exceeds a threshold, by default 6 standard
-    deviations of the noise. Samples closer than the dead time [s], at least 10 samples, belong to
-    one event.
+    deviations of the noise. Samples closer than 10 intervals belong to one event.
     """
     if CHANNEL not in tree.data_vars:
         raise FileError(
@@ -60,7 +56,7 @@ def emissions_of(tree: Tree, threshold: float | None = None, dead_time: float = 
         threshold = 0.5 * float(size.max()) if is_trigger else THRESHOLD * noise
     above = np.flatnonzero(size > threshold)
     step = float(np.median(np.diff(time))) if time.size > 1 else 0.0
-    rest = 1.5 * step if is_trigger else max(dead_time, DEAD_SAMPLES * step)
+    rest = 1.5 * step if is_trigger else DEAD_SAMPLES * step
     if not above.size:
         none = np.empty(0)
         return Emissions(none, none, none, none, threshold, is_trigger)

@@ -9,18 +9,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mesoslip.analysis.events.channel import CHANNEL, Emissions, emissions_of
 from mesoslip.analysis.events.laws import BValue, Omori, b_value, omori
-from mesoslip.errors import ConfigError, FileError, Problem
+from mesoslip.array_types import Array
+from mesoslip.configuration.arguments import check_choice
+from mesoslip.errors import FileError
 from mesoslip.output.access import group_of
 from mesoslip.output.arrays import Tree
 from mesoslip.output.inputs import OutputLike, opened_run_arrays
 from mesoslip.output.table_files import PrintedTable, write_table
 from mesoslip.quantities import number, with_error
-
-Array = NDArray[np.float64]
 
 # Catalogues, and the column that is the size of an event.
 CATALOGUES = {"slips": "force_drop", "avalanches": "size", "channel": "amplitude"}
@@ -142,13 +141,6 @@ class EventSummary:
         }
 
 
-def check_catalogue(key: str, catalogue: str | None) -> None:
-    """Check the name of a catalogue."""
-    if catalogue is not None and catalogue not in CATALOGUES:
-        names = ", ".join(CATALOGUES)
-        raise ConfigError([Problem("", key, f"must be one of {names}", catalogue)])
-
-
 def events_of(
     tree: Tree,
     catalogue: str | None = None,
@@ -267,7 +259,7 @@ def events(
     ConfigError
         If there is no catalogue of that name.
     """
-    check_catalogue("catalogue", catalogue)
+    check_choice("catalogue", catalogue, CATALOGUES)
     with opened_run_arrays(output) as tree:
         return events_of(
             tree, catalogue, threshold=threshold, completeness=completeness, main_size=main_size

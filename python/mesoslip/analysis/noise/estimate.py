@@ -17,9 +17,8 @@ from mesoslip.analysis.noise.levels import (
     noise_level,
 )
 from mesoslip.analysis.noise.parts import parts_of
+from mesoslip.array_types import Array
 from mesoslip.quantities import number, with_unit
-
-Array = NDArray[np.float64]
 
 # Blocks of the trace for the drift, and its minimum size in standard errors.
 DRIFT_BLOCKS = 20
@@ -29,8 +28,6 @@ MIN_DRIFT = 4.0
 RELAXED = 0.5
 # Points from which the error of a sum over correlated noise is computed.
 MAX_POINTS = 400
-# Share of the samples from which on impulses are reported to be many.
-MANY_IMPULSES = 0.05
 
 
 @dataclass(frozen=True)

@@ -6,11 +6,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mesoslip.analysis.power_spectrum import power_spectrum
-
-Array = NDArray[np.float64]
+from mesoslip.array_types import Array
 
 # Relative tolerance of the frequency of a line.
 TOLERANCE = 2e-3

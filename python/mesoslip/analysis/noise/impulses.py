@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip.analysis.noise.levels import NORMAL_MEDIAN
-
-Array = NDArray[np.float64]
+from mesoslip.array_types import Array
 
 # Widths of the running medians of the force, and of the deviations from it [samples].
 WIDTH, SCATTER_WIDTH = 7, 15

@@ -6,9 +6,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from mesoslip.array_types import Array
 
 # Orders of differences for the estimate of the white noise.
 ORDERS = range(1, 8)
@@ -139,8 +138,7 @@ def _products(covariance: Array) -> Array:
     """Sums of products of residuals around polynomials, by lag, for noise with a covariance."""
     length = len(covariance)
     residual = _without_polynomials(_without_polynomials(covariance).T)
-    products: Array = np.array([np.trace(residual, lag) for lag in range(length // 2)])
-    return products
+    return np.array([np.trace(residual, lag) for lag in range(length // 2)])
 
 
 def _windows(force: Array, length: int) -> Array:

@@ -1,8 +1,8 @@
 """Plateaus of a record: between steps of the speed, of the load, or of the force itself."""
 
 from mesoslip.analysis.plateaus.catalogue import (
+    SIGNALS,
     Plateaus,
-    check_signal,
     plateaus,
     plateaus_from,
     plateaus_of,
@@ -10,8 +10,8 @@ from mesoslip.analysis.plateaus.catalogue import (
 from mesoslip.analysis.plateaus.levels import levels_of
 
 __all__ = [
+    "SIGNALS",
     "Plateaus",
-    "check_signal",
     "levels_of",
     "plateaus",
     "plateaus_from",

@@ -7,29 +7,26 @@ import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mesoslip.analysis.apparatus import apparatus_of, with_force_unit
+from mesoslip.analysis.apparatus import apparatus_of
 from mesoslip.analysis.plateaus.levels import Level, levels_of
 from mesoslip.analysis.printed_columns import printed_columns
-from mesoslip.analysis.steady_force import steady_mean
+from mesoslip.analysis.steady_force import NORMAL_95, steady_mean
 from mesoslip.analysis.strokes import output_pieces
+from mesoslip.array_types import Array, Dataset
 from mesoslip.configuration import arguments
+from mesoslip.configuration.arguments import check_choice
 from mesoslip.configuration.units import to_si
-from mesoslip.errors import ConfigError, FileError, Problem
+from mesoslip.errors import FileError
 from mesoslip.output.access import group_of
 from mesoslip.output.arrays import Tree
 from mesoslip.output.inputs import OutputLike, opened_run_arrays
-from mesoslip.output.table_files import PrintedTable, write_table
+from mesoslip.output.table_files import PrintedTable, rows_of, write_table
 from mesoslip.output.variables import REALIZATION_INDEX, Estimate, Group, Meaning
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-Array = NDArray[np.float64]
 
 PLATEAUS = Group(
     realization_index=REALIZATION_INDEX,
@@ -66,8 +63,6 @@ MIN_SAMPLES = 5
 STAGES, FORCE = "stages of the load point", "force"
 # Names of the signals for `signal`, and in messages.
 SIGNALS = ("speed", "load", FORCE)
-# Half the width of a 95 % interval over the standard error.
-NORMAL_95 = 1.96
 
 
 @dataclass(frozen=True)
@@ -85,14 +80,7 @@ class Plateaus:
     @property
     def rows(self) -> list[dict[str, Any]]:
         """A dictionary for each plateau; None for unknown values."""
-        lists = [column.tolist() for column in self.columns.values()]
-        return [
-            {
-                name: None if value != value else value
-                for name, value in zip(self.columns, row, strict=True)
-            }
-            for row in zip(*lists, strict=True)
-        ]
+        return rows_of(self.columns)
 
     @property
     def notes(self) -> list[str]:
@@ -109,17 +97,11 @@ class Plateaus:
     @property
     def tables(self) -> list[PrintedTable]:
         """The plateaus for print."""
-        unit = self.force_unit
-        return [
-            printed_columns("Plateaus", self.columns, HEADS, lambda si: with_force_unit(si, unit))
-        ]
+        return [printed_columns("Plateaus", self.columns, HEADS, self.force_unit)]
 
     def write_csv(self, path: Path) -> None:
         """Write the plateaus as a table in SI."""
-        units = {
-            name: with_force_unit(one.units, self.force_unit) for name, one in PLATEAUS.items()
-        }
-        write_table(self.rows, units, path)
+        write_table(self.rows, PLATEAUS.units(self.force_unit), path)
 
     def to_json(self) -> dict[str, Any]:
         """Everything as nested lists and numbers."""
@@ -159,11 +141,7 @@ def plateaus_of(
         raise FileError(
             f"{name}: has no plateau by the {source}: no {MIN_SAMPLES} samples at one level"
         )
-    columns = {
-        key: np.array([one.get(key, math.nan) for one in rows], dtype=meaning.dtype)
-        for key, meaning in PLATEAUS.items()
-    }
-    return Plateaus(columns, apparatus.force_unit, source, viscosity)
+    return Plateaus(PLATEAUS.columns(rows), apparatus.force_unit, source, viscosity)
 
 
 def _viscosity(tree: Tree) -> float | None:
@@ -300,13 +278,7 @@ def _mean_of(values: Array) -> tuple[float, float]:
     return float(values.mean()), width * float(values.std(ddof=1)) / math.sqrt(values.size)
 
 
-def check_signal(key: str, signal: str | None) -> None:
-    """Check the name of a signal."""
-    if signal is not None and signal not in SIGNALS:
-        raise ConfigError([Problem("", key, f"must be one of {', '.join(SIGNALS)}", signal)])
-
-
-def plateaus_from(data: xr.Dataset) -> Plateaus:
+def plateaus_from(data: Dataset) -> Plateaus:
     """The plateaus that `plateaus` returned."""
     columns = {str(name): one.values for name, one in data.data_vars.items()}
     viscosity = data.attrs.get("viscosity")
@@ -316,7 +288,7 @@ def plateaus_from(data: xr.Dataset) -> Plateaus:
 @arguments.checked(viscosity=arguments.number(0, is_open=True))
 def plateaus(
     output: OutputLike, *, signal: str | None = None, viscosity: float | None = None
-) -> xr.Dataset:
+) -> Dataset:
     """Mean friction of each plateau of a record, between steps of speed, load or force.
 
     Parameters
@@ -345,16 +317,9 @@ def plateaus(
     ConfigError
         If the signal is another one, or the viscosity not above 0.
     """
-    import xarray as xr
-
-    check_signal("signal", signal)
+    check_choice("signal", signal, SIGNALS)
     with opened_run_arrays(output) as tree:
         found = plateaus_of(tree, signal=signal, viscosity=viscosity)
-    variables = {
-        name: PLATEAUS.variable(name, ("plateau",), values)
-        for name, values in found.columns.items()
-    }
-    for one in variables.values():
-        one.attrs["units"] = with_force_unit(one.attrs["units"], found.force_unit)
     known = {} if found.viscosity is None else {"viscosity": found.viscosity}
-    return xr.Dataset(variables, attrs={"source": found.source} | known)
+    attributes = {"source": found.source} | known
+    return PLATEAUS.dataset(("plateau",), found.columns, found.force_unit, attributes)

@@ -13,9 +13,9 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from mesoslip.analysis.noise.levels import NORMAL_MEDIAN
+from mesoslip.array_types import Array
 
 # Maximum number of means, and minimum number in a piece.
 MAX_POINTS, MIN_POINTS = 2000, 3
@@ -37,8 +37,6 @@ MIN_ERRORS = 4.0
 # Minimum size of a step over that of differences of means over the same times elsewhere, in
 # standard deviations: the maximum of thousands of normal ones is about 4.
 MIN_SHARPNESS = 5.0
-# Median of the absolute value of a standard normal deviate.
-NORMAL_MEDIAN = 0.6744897501960817
 
 
 class Level(NamedTuple):

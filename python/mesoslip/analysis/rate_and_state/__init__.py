@@ -2,12 +2,7 @@
 
 from mesoslip.analysis.rate_and_state.law import LAWS, RateAndState
 from mesoslip.analysis.rate_and_state.noise import Noise, NoiseModel, estimated_noise, known_noise
-from mesoslip.analysis.rate_and_state.points import (
-    Loading,
-    Points,
-    points_of_run,
-    points_of_trace,
-)
+from mesoslip.analysis.rate_and_state.points import Loading, Points, points_of_run, points_of_trace
 from mesoslip.analysis.rate_and_state.records import Record, records_of
 from mesoslip.analysis.rate_and_state.rows import FIT, assessment, fit_rows, fitted_trend
 from mesoslip.analysis.rate_and_state.search import MAX_MISFIT, Fit, fit_laws, preferred_law

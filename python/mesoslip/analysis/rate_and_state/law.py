@@ -22,8 +22,7 @@ from numpy.typing import NDArray
 
 from mesoslip import _core
 from mesoslip.analysis.rate_and_state.points import Points
-
-Array = NDArray[np.float64]
+from mesoslip.array_types import Array
 
 # Laws: the evolution of the state, and the number of state variables.
 LAWS = {

@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip.analysis.rate_and_state.points import Points
-
-Array = NDArray[np.float64]
+from mesoslip.array_types import Array
 
 # Minimum noise of a sample over the range of the force: errors of the motion.
 MIN_NOISE = 1e-6
@@ -53,8 +52,7 @@ class Noise:
     def point_deviation(self) -> Array:
         """Standard deviations of the points."""
         is_white = self.factor.ndim == 1
-        deviation: Array = self.factor if is_white else np.linalg.norm(self.factor, axis=1)
-        return deviation
+        return self.factor if is_white else np.linalg.norm(self.factor, axis=1)
 
     def whitened(self, values: Array) -> Array:
         """Values, a column each, over the noise."""
@@ -129,8 +127,7 @@ def _mean_square(size: Array, change: Array) -> Array:
     """Mean square of means of the same process over intervals of lengths over its own, with
     exp(-size) - 1."""
     small = size < 1e-3
-    mean: Array = np.where(small, 1 - size / 3, 2 * (size + change) / size**2)
-    return mean
+    return np.where(small, 1 - size / 3, 2 * (size + change) / size**2)
 
 
 @dataclass(frozen=True)
@@ -165,8 +162,7 @@ class NoiseModel:
         variance, and its correlation time [s].
         """
         correlated = averaged_covariance(self.start, self.end, time)
-        covariance: Array = deviation**2 * (share * correlated + np.diag((1 - share) / self.count))
-        return covariance
+        return deviation**2 * (share * correlated + np.diag((1 - share) / self.count))
 
     def log_likelihood(self, residual: Array, deviation: Array, share: Array, time: Array) -> Array:
         """Logarithm of the normal density of residuals, shape (sets,), by `covariance` without its

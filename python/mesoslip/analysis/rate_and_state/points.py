@@ -9,7 +9,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from mesoslip.array_types import Array
+
 Samples = NDArray[np.int64]
 
 # Points of a stage, evenly spaced in time and in its logarithm; fewer if a record would have more

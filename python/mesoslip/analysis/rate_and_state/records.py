@@ -9,20 +9,13 @@ from dataclasses import dataclass, replace
 from itertools import takewhile
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mesoslip.analysis.experiment_stages import Experiment, Stage
 from mesoslip.analysis.rate_and_state.law import LAWS
 from mesoslip.analysis.rate_and_state.noise import Noise, known_noise
-from mesoslip.analysis.rate_and_state.points import (
-    Loading,
-    Points,
-    points_of_run,
-    points_of_trace,
-)
+from mesoslip.analysis.rate_and_state.points import Loading, Points, points_of_run, points_of_trace
+from mesoslip.array_types import Array
 from mesoslip.quantities import with_unit
-
-Array = NDArray[np.float64]
 
 # Blocks of the first stage that are compared with the line through its last half, and the maximum
 # deviation of a block over the scatter about the line.

@@ -102,11 +102,8 @@ def fitted_trend(rows: Sequence[dict[str, Any]]) -> float:
 
 
 def _empty_row(number: int, law: str, note: str) -> dict[str, Any]:
-    row: dict[str, Any] = {
-        name: math.nan if one.dtype is np.float64 else "" if one.dtype is np.str_ else 0
-        for name, one in FIT.items()
-    }
-    return row | {"output_index": number, "stage_number": -1, "law": law, "note": note}
+    own = {"output_index": number, "stage_number": -1, "law": law, "note": note}
+    return FIT.empty_row | own
 
 
 def _row(number: int, found: Fit, is_preferred: bool) -> dict[str, Any]:

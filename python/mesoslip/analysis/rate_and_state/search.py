@@ -8,14 +8,12 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mesoslip.analysis.rate_and_state.law import RateAndState
 from mesoslip.analysis.rate_and_state.noise import Noise, estimated_noise, white_noise
 from mesoslip.analysis.rate_and_state.records import Record
+from mesoslip.array_types import Array
 from mesoslip.errors import RunError
-
-Array = NDArray[np.float64]
 
 # Maximum number of evaluations in least squares.
 MAX_EVALUATIONS = 40
@@ -168,13 +166,7 @@ def preferred_law(fits: dict[str, Fit]) -> str:
 
 def fit_laws(record: Record, laws: Sequence[str] = ()) -> dict[str, Fit]:
     """Fits of the laws of a record, or of some of them, all with the noise about the best of them
-    unless it is known. A law of two states needs that of one state.
-
-    Raises
-    ------
-    RunError
-        If the motion cannot be integrated for any parameters.
-    """
+    unless it is known. A law of two states needs that of one state."""
     noise = record.noise or white_noise(record.points.count, 1.0)
     weight = noise.point_deviation**-2
     models: dict[str, RateAndState] = {}

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from mesoslip.array_types import Array
 
 # Minimum force drop of the slips of a motion over the loading by the drive.
 MIN_SHARE = 0.5

@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mesoslip.analysis.apparatus import Apparatus, apparatus_of
 from mesoslip.analysis.even_traces import INTERVAL_TOLERANCE
@@ -17,17 +16,15 @@ from mesoslip.analysis.regime.result import NAMES, REGIME, SMOOTH, TRANSIENT, Re
 from mesoslip.analysis.regime.rules import classify
 from mesoslip.analysis.regime.scales import Scales, Stage, measured_stage, stage_of
 from mesoslip.analysis.strokes import Piece, output_pieces, sliding_of
+from mesoslip.array_types import Array, Dataset, DataTree
 from mesoslip.output.access import group_of, is_measured
 from mesoslip.output.arrays import Tree
 from mesoslip.output.inputs import OutputLike, opened_run
 from mesoslip.simulation.recorded_tables import SLIP_COLUMNS, TRACE_COLUMNS
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from mesoslip.simulation.run_realizations import Results
 
-Array = NDArray[np.float64]
 
 # Maximum number of evaluated samples; longer traces are thinned out.
 MAX_SAMPLES = 400_000
@@ -35,7 +32,7 @@ MAX_SAMPLES = 400_000
 SLIP_NAMES = ("start_time", "end_time", "force_before", "force_drop")
 
 
-def regimes(tree: xr.DataTree, name: str = "the output") -> xr.Dataset:
+def regimes(tree: DataTree, name: str = "the output") -> Dataset:
     """The variables `REGIME` of each realization of an output; ``name`` is that in messages.
 
     A slider under a force is smooth if it creeps steadily in the last stage, otherwise transient,
@@ -168,7 +165,7 @@ def _even(time: Array, *values: Array) -> tuple[Array, ...]:
     return even, *(np.interp(even, time, one) for one in values)
 
 
-def regime(output: OutputLike) -> xr.Dataset:
+def regime(output: OutputLike) -> Dataset:
     """The regime of each realization of an output: smooth, stick-slip, irregular, or transient.
 
     Parameters

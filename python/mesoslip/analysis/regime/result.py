@@ -5,17 +5,15 @@ from __future__ import annotations
 import math
 from collections import Counter
 from dataclasses import dataclass, field, fields
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import DTypeLike
 
 from mesoslip.analysis.regime.events import MIN_CYCLES
+from mesoslip.array_types import Dataset
 from mesoslip.output.variables import Group, Meaning
 from mesoslip.quantities import percent, with_error, with_unit
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 SMOOTH, STICK_SLIP, IRREGULAR, TRANSIENT = range(4)
 # What forces are divided by: the one of a model, or the maximum of a measured force.
@@ -136,7 +134,7 @@ class RegimeResult:
 REGIME = Group({one.name: one.metadata["meaning"] for one in fields(RegimeResult) if one.metadata})
 
 
-def results_of(data: xr.Dataset) -> list[RegimeResult]:
+def results_of(data: Dataset) -> list[RegimeResult]:
     """The results in a dataset of `regimes`, one for each realization."""
     columns = {name: data[name].values.tolist() for name in REGIME}
     return [

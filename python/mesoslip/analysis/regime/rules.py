@@ -6,7 +6,6 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mesoslip.analysis.regime.events import (
     MIN_CYCLES,
@@ -22,8 +21,7 @@ from mesoslip.analysis.regime.events import (
 from mesoslip.analysis.regime.result import IRREGULAR, SMOOTH, STICK_SLIP, TRANSIENT, RegimeResult
 from mesoslip.analysis.regime.scales import Scales
 from mesoslip.analysis.stick_phases import relieved_loading
-
-Array = NDArray[np.float64]
+from mesoslip.array_types import Array
 
 # Maximum amplitude of smooth sliding without noise, over the mean force.
 SMOOTH_AMPLITUDE = 0.02

@@ -6,15 +6,13 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mesoslip.analysis.apparatus import Apparatus
 from mesoslip.analysis.regime.result import MAXIMUM_FORCE, STATIC_FORCE
+from mesoslip.array_types import Array
 from mesoslip.configuration.config import Config
 from mesoslip.output.access import group_of
 from mesoslip.output.arrays import Tree
-
-Array = NDArray[np.float64]
 
 # Amplitude of the noise of N contacts in steady sliding over the static force, times N^(1/2): 0.6,
 # with a margin.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -10,14 +9,31 @@ import numpy as np
 from mesoslip.analysis.experiment_stages import Stage
 from mesoslip.output.variables import Estimate, Group, Meaning
 
-_OUTPUT = Meaning("1", "number of the output, from 0", np.int64)
-_STAGE = Meaning("1", "number of the stage of the drive, from 0", np.int64)
 _IS_EXACT = Meaning("1", "whether the peak is that of the motion, not of the samples", np.int8)
-_NOTE = Meaning("1", "limitations, missing values and their reasons", np.str_)
 
-STEADY = Group(
-    output_index=_OUTPUT,
-    stage_number=_STAGE,
+
+def _rows(**columns: Meaning) -> Group:
+    """Columns of the rows of stages."""
+    return Group(
+        output_index=Meaning("1", "number of the output, from 0", np.int64),
+        stage_number=Meaning("1", "number of the stage of the drive, from 0", np.int64),
+        **columns,
+        note=Meaning("1", "limitations, missing values and their reasons", np.str_),
+    )
+
+
+def _line(name: str, meaning: str) -> Group:
+    """Scalars of a line through rows."""
+    return Group(
+        {
+            name: Estimate("N", meaning),
+            f"{name}_chi_square": Meaning("1", "chi square of the line"),
+            f"{name}_freedom": Meaning("1", "degrees of freedom of the line", np.int64),
+        }
+    )
+
+
+STEADY = _rows(
     stage_start_time=Meaning("s", "start of the stage"),
     velocity=Meaning("m s-1", "velocity of the drive"),
     steady_force=Estimate("N", "mean force after the transient, against the drive"),
@@ -31,12 +47,9 @@ STEADY = Group(
     ),
     is_steady=Meaning("1", "whether the transient is over, and halves of the rest agree", np.int8),
     is_resolved=Meaning("1", "whether the stage is long enough for a reliable error", np.int8),
-    note=_NOTE,
 )
 
-STEPS = Group(
-    output_index=_OUTPUT,
-    stage_number=_STAGE,
+STEPS = _rows(
     step_time=Meaning("s", "time of the step"),
     velocity_before=Meaning("m s-1", "velocity of the drive before the step"),
     velocity_after=Meaning("m s-1", "velocity of the drive after the step"),
@@ -57,12 +70,9 @@ STEPS = Group(
         "m", "area between force and steady force, over the evolution change"
     ),
     overshoot=Meaning("N", "maximum deviation beyond the steady force after the peak"),
-    note=_NOTE,
 )
 
-LOAD_STEPS = Group(
-    output_index=_OUTPUT,
-    stage_number=_STAGE,
+LOAD_STEPS = _rows(
     load_step_time=Meaning("s", "time of the step of the normal load"),
     normal_force_before=Meaning("N", "normal force before the step"),
     normal_force_after=Meaning("N", "normal force after the step"),
@@ -77,12 +87,9 @@ LOAD_STEPS = Group(
     relaxation_displacement=Estimate(
         "m", "length of the exponential decay over the slider's displacement"
     ),
-    note=_NOTE,
 )
 
-HOLDS = Group(
-    output_index=_OUTPUT,
-    stage_number=_STAGE,
+HOLDS = _rows(
     hold_start_time=Meaning("s", "start of the hold"),
     hold_time=Meaning("s", "duration of the hold"),
     velocity_before=Meaning("m s-1", "velocity of the drive before the hold"),
@@ -100,12 +107,9 @@ HOLDS = Group(
     load_to_peak=Meaning(
         "m", "displacement of the load point from the end of the hold to the peak"
     ),
-    note=_NOTE,
 )
 
-CREEP = Group(
-    output_index=_OUTPUT,
-    stage_number=_STAGE,
+CREEP = _rows(
     stage_start_time=Meaning("s", "start of the stage"),
     duration=Meaning("s", "duration of the stage"),
     force=Meaning("N", "constant force on the slider"),
@@ -113,12 +117,9 @@ CREEP = Group(
     velocity=Estimate("m s-1", "mean velocity after the transient"),
     transient_time=Meaning("s", "duration of the discarded transient"),
     is_steady=Meaning("1", "whether the transient is over, and halves of the rest agree", np.int8),
-    note=_NOTE,
 )
 
-RAMPS = Group(
-    output_index=_OUTPUT,
-    stage_number=_STAGE,
+RAMPS = _rows(
     stage_start_time=Meaning("s", "start of the stage"),
     force_rate=Meaning("N s-1", "rate at which the force grows"),
     hold_time=Meaning("s", "duration of the constant force before the ramp"),
@@ -127,12 +128,9 @@ RAMPS = Group(
     static_friction=Estimate("N", "maximum force of the contacts, from which the slider slides"),
     slide_time=Meaning("s", "time from the start of the ramp to the maximum"),
     displacement=Meaning("m", "displacement of the slider from the start to the maximum"),
-    note=_NOTE,
 )
 
-RESTARTS = Group(
-    output_index=_OUTPUT,
-    stage_number=_STAGE,
+RESTARTS = _rows(
     stage_start_time=Meaning("s", "start of the stage"),
     hold_time=Meaning("s", "duration of the smaller force before the stage"),
     hold_force=Meaning("N", "smaller constant force before the stage"),
@@ -140,49 +138,17 @@ RESTARTS = Group(
     restart_time=Estimate(
         "s", "time from the start of the stage until the slider has moved by the breaking stretch"
     ),
-    note=_NOTE,
 )
 
 # Scalars of a group: those of the line through its rows.
-STEADY_LINE = Group(
-    rate_dependence=Estimate("N", "slope of the steady force over ln V, a - b"),
-    rate_dependence_chi_square=Meaning("1", "chi square of the line"),
-    rate_dependence_freedom=Meaning("1", "degrees of freedom of the line", np.int64),
-)
-HEALING_LINE = Group(
-    healing_per_decade=Estimate("N", "increase of the peak per decade of hold time, beta"),
-    healing_per_decade_chi_square=Meaning("1", "chi square of the line"),
-    healing_per_decade_freedom=Meaning("1", "degrees of freedom of the line", np.int64),
-)
-
-CREEP_LINE = Group(
-    creep_rate_dependence=Estimate("N", "slope of the force over ln V, a - b"),
-    creep_rate_dependence_chi_square=Meaning("1", "chi square of the line"),
-    creep_rate_dependence_freedom=Meaning("1", "degrees of freedom of the line", np.int64),
-)
-FRICTION_LINE = Group(
-    friction_rate_dependence=Estimate(
-        "N", "slope of the static friction over ln of the force rate"
-    ),
-    friction_rate_dependence_chi_square=Meaning("1", "chi square of the line"),
-    friction_rate_dependence_freedom=Meaning("1", "degrees of freedom of the line", np.int64),
+STEADY_LINE = _line("rate_dependence", "slope of the steady force over ln V, a - b")
+HEALING_LINE = _line("healing_per_decade", "increase of the peak per decade of hold time, beta")
+CREEP_LINE = _line("creep_rate_dependence", "slope of the force over ln V, a - b")
+FRICTION_LINE = _line(
+    "friction_rate_dependence", "slope of the static friction over ln of the force rate"
 )
 
 
 def empty_row(group: Group, number: int, stage: Stage) -> dict[str, Any]:
-    """A row of a group without values.
-
-    Parameters
-    ----------
-    group
-        The columns.
-    number
-        Number of the output.
-    stage
-        The stage.
-    """
-    row: dict[str, Any] = {
-        name: "" if meaning.dtype is np.str_ else 0 if meaning.dtype is not np.float64 else math.nan
-        for name, meaning in group.items()
-    }
-    return row | {"output_index": number, "stage_number": stage.number}
+    """A row of a group without values, for a stage of the output of a number."""
+    return group.empty_row | {"output_index": number, "stage_number": stage.number}

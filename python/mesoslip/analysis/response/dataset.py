@@ -7,8 +7,9 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from functools import partial
+from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -27,22 +28,49 @@ from mesoslip.analysis.response.columns import (
     STEADY_LINE,
     STEPS,
 )
-from mesoslip.analysis.response.forces import creep_line, creep_rows, friction_line, ramp_rows
+from mesoslip.analysis.response.forces import (
+    creep_line,
+    creep_rows,
+    friction_line,
+    ramp_rows,
+    restart_rows,
+)
 from mesoslip.analysis.response.holds import healing_line, hold_rows
 from mesoslip.analysis.response.line import Line
 from mesoslip.analysis.response.load_steps import load_step_rows
-from mesoslip.analysis.response.restarts import restart_rows
 from mesoslip.analysis.response.steady import steady_line, steady_rows
 from mesoslip.analysis.response.steps import step_rows
+from mesoslip.array_types import DataTree
 from mesoslip.configuration import arguments
 from mesoslip.errors import FileError
 from mesoslip.output.arrays import Arrays, Tree, Values, Variable, in_xarray
 from mesoslip.output.inputs import OutputLike, opened_run_arrays, several
 from mesoslip.output.table_files import write_table
-from mesoslip.output.variables import Group
+from mesoslip.output.variables import Group, with_force_unit
 
-if TYPE_CHECKING:
-    import xarray as xr
+
+class _Rows(NamedTuple):
+    """A group of rows: columns, dimension, the rows of an output with a number, and a line through
+    them with its scalars."""
+
+    columns: Group
+    dimension: str
+    rows_of: Callable[[Experiment, int], list[dict[str, Any]]]
+    line: Group | None = None
+    line_of: Callable[[Arrays], Line | None] | None = None
+
+
+# Rows of fits are made before those of others, whose trend they remove.
+GROUPS = {
+    "steady": _Rows(STEADY, "velocity_stage", steady_rows, STEADY_LINE, steady_line),
+    "steps": _Rows(STEPS, "step", step_rows),
+    "load_steps": _Rows(LOAD_STEPS, "load_step", load_step_rows),
+    "holds": _Rows(HOLDS, "hold", hold_rows, HEALING_LINE, healing_line),
+    "rate_and_state": _Rows(FIT, "fit", fit_rows),
+    "creep": _Rows(CREEP, "force_stage", creep_rows, CREEP_LINE, creep_line),
+    "restarts": _Rows(RESTARTS, "restart", restart_rows),
+    "ramps": _Rows(RAMPS, "ramp", ramp_rows, FRICTION_LINE, friction_line),
+}
 
 
 @arguments.checked(
@@ -56,7 +84,7 @@ def response(
     normal_force: float | None = None,
     fit: bool = True,
     free_stiffness: bool = False,
-) -> xr.DataTree:
+) -> DataTree:
     """Steady forces, velocity steps, holds and rate-and-state parameters of one or more outputs.
     See ``docs/response.md``.
 
@@ -129,26 +157,10 @@ def response_of(
     with_fit: bool = True,
     free_stiffness: bool = False,
 ) -> Arrays:
-    """Steady forces, velocity steps, holds, and rate-and-state parameters of experiments.
+    """The `GROUPS` of experiments.
 
-    Parameters
-    ----------
-    experiments
-        The outputs.
-    normal_force
-        Normal force [N] for variables with the suffix ``_coefficient``; by default forces are
-        divided by the static force, with the suffix ``_ratio``.
-    with_fit
-        Whether rate-and-state parameters are fitted.
-    free_stiffness
-        Whether the stiffness is fitted too, instead of that of the run.
-
-    Returns
-    -------
-    Arrays
-        Groups ``steady`` (dimension ``velocity_stage``), ``steps`` (``step``), ``holds``
-        (``hold``), ``rate_and_state`` (``fit``, one for each output and law), ``creep``
-        (``force_stage``), ``restarts`` (``restart``) and ``ramps`` (``ramp``).
+    Forces are also divided by the normal force [N], in variables with the suffix ``_coefficient``;
+    by default by the static force, with the suffix ``_ratio``.
     """
     fits: list[dict[str, Any]] = []
     analysed = []
@@ -157,16 +169,6 @@ def response_of(
         mine = fit_rows(one, number, free_stiffness=free_stiffness) if has_fit else []
         fits += mine
         analysed.append(one.without_trend(fitted_trend(mine)) if one.is_measured else one)
-    numbered = list(enumerate(analysed))
-    rows = {
-        "steady": [row for number, one in numbered for row in steady_rows(one, number)],
-        "steps": [row for number, one in numbered for row in step_rows(one, number)],
-        "load_steps": [row for number, one in numbered for row in load_step_rows(one, number)],
-        "holds": [row for number, one in numbered for row in hold_rows(one, number)],
-        "creep": [row for number, one in numbered for row in creep_rows(one, number)],
-        "restarts": [row for number, one in numbered for row in restart_rows(one, number)],
-        "ramps": [row for number, one in numbered for row in ramp_rows(one, number)],
-    }
     names = {one.apparatus.force_name for one in experiments}
     if len(names) > 1:
         raise FileError(
@@ -174,16 +176,10 @@ def response_of(
             "of coefficients again with --normal-force"
         )
     are_coefficients = names == {"friction_coefficient"}
-    parts = {
-        "steady": _part(STEADY, "velocity_stage", rows["steady"], STEADY_LINE, steady_line),
-        "steps": _part(STEPS, "step", rows["steps"]),
-        "load_steps": _part(LOAD_STEPS, "load_step", rows["load_steps"]),
-        "holds": _part(HOLDS, "hold", rows["holds"], HEALING_LINE, healing_line),
-        "rate_and_state": _part(FIT, "fit", fits),
-        "creep": _part(CREEP, "force_stage", rows["creep"], CREEP_LINE, creep_line),
-        "restarts": _part(RESTARTS, "restart", rows["restarts"]),
-        "ramps": _part(RAMPS, "ramp", rows["ramps"], FRICTION_LINE, friction_line),
-    }
+    parts = {}
+    for name, group in GROUPS.items():
+        made = (group.rows_of(one, number) for number, one in enumerate(analysed))
+        parts[name] = _part(group, fits if name == "rate_and_state" else [*chain(*made)])
     # Unknown without a configuration.
     static = {one.static_force for one in experiments if not math.isnan(one.static_force)}
     attributes: dict[str, Any] = {"outputs": [one.name for one in experiments]}
@@ -203,28 +199,24 @@ def response_of(
     return Arrays({}, {}, attributes, parts)
 
 
-def _part(
-    group: Group,
-    dimension: str,
-    rows: Sequence[Mapping[str, Any]],
-    line_group: Group | None = None,
-    line_of: Callable[[Arrays], Line | None] | None = None,
-) -> Arrays:
+def _part(group: _Rows, rows: Sequence[Mapping[str, Any]]) -> Arrays:
     """A group of rows, a variable for each column, and the scalars of a line through them."""
     columns: dict[str, Variable] = {
         name: Values(
-            (dimension,),
+            (group.dimension,),
             np.array([row[name] for row in rows], dtype=meaning.dtype),
             meaning.attributes,
         )
-        for name, meaning in group.items()
+        for name, meaning in group.columns.items()
     }
-    data = Arrays(columns, {dimension: len(rows)}, {})
-    if line_group is None or line_of is None:
+    data = Arrays(columns, {group.dimension: len(rows)}, {})
+    if group.line is None or group.line_of is None:
         return data
     scalars: dict[str, Variable] = {
         name: Values((), np.asarray(value, dtype=meaning.dtype), meaning.attributes)
-        for (name, meaning), value in zip(line_group.items(), _scalars(line_of(data)), strict=True)
+        for (name, meaning), value in zip(
+            group.line.items(), _scalars(group.line_of(data)), strict=True
+        )
     }
     return Arrays({**columns, **scalars}, data.sizes, {})
 
@@ -259,12 +251,11 @@ def _with_ratios(data: Arrays, scale: float, suffix: str, of: str) -> Arrays:
 def _as_coefficients(data: Arrays) -> Arrays:
     """A group of a trace of friction coefficients: forces have the suffix ``_coefficient``, and
     stiffnesses are inverse lengths."""
-    units = {"N": "1", "N m-1": "m-1"}
     variables = {
         ratio_name(name, "coefficient") if one.attrs["units"] == "N" else name: Values(
             one.dims,
             one.values,
-            {**one.attrs, "units": units.get(one.attrs["units"], one.attrs["units"])},
+            {**one.attrs, "units": with_force_unit(one.attrs["units"], "1")},
         )
         for name, one in data.items()
     }
@@ -291,14 +282,9 @@ def write_csv(tree: Tree, path: Path) -> None:
 
     A stage at constant velocity has the columns of ``steady``, and those of ``steps`` if it starts
     with a step; a hold has those of ``holds``, a constant force those of ``creep`` and, after a
-    smaller one, of ``restarts``, a growing one those of ``ramps``. The notes on steps and
-    restarts have columns of their own. Steps of the normal load have rows of their own after that
-    of their stage, with the columns of ``load_steps``.
-
-    Raises
-    ------
-    FileError
-        If it cannot be written.
+    smaller one, of ``restarts``, a growing one those of ``ramps``. The notes on steps and restarts
+    have columns of their own. Steps of the normal load have rows of their own after that of their
+    stage, with the columns of ``load_steps``.
     """
     own_notes = {"restarts": "restart_note", "steps": "step_note"}
     units: dict[str, str] = {}

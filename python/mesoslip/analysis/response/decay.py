@@ -6,9 +6,8 @@ import math
 import warnings
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from mesoslip.array_types import Array
 
 # Maximum number of points in a fit, of each of the two spacings.
 MAX_POINTS = 2000
@@ -17,21 +16,11 @@ MAX_POINTS = 2000
 def decay(
     displacement: Array, force: Array, correlation: float, noise: float
 ) -> tuple[float, float] | None:
-    """Length of an exponential decay of a force over a displacement, and its standard error.
+    """Length of an exponential decay of a force over an ascending displacement [m], both of shape
+    (samples,), and its standard error; None if the samples do not determine it.
 
-    Parameters
-    ----------
-    displacement, force
-        Displacement [m], ascending, and force [N], each of shape (samples,).
-    correlation
-        Samples per independent sample.
-    noise
-        Standard deviation of the force about the decay.
-
-    Returns
-    -------
-    tuple or None
-        None if the samples do not determine the length.
+    The noise is a standard deviation about the decay, the correlation a number of samples per
+    independent sample.
     """
     from scipy.optimize import OptimizeWarning, curve_fit
 

@@ -10,22 +10,14 @@ import numpy as np
 from mesoslip.analysis.experiment_stages import Experiment, Stage
 from mesoslip.analysis.response.columns import HOLDS, empty_row
 from mesoslip.analysis.response.line import Line, line
-from mesoslip.analysis.response.scatter import error_of_mean, scatter
+from mesoslip.analysis.steady_force import error_of_mean, scatter
 
 if TYPE_CHECKING:
     from mesoslip.output.arrays import Arrays
 
 
 def hold_rows(experiment: Experiment, number: int) -> list[dict[str, Any]]:
-    """Each hold, with the restart after it.
-
-    Parameters
-    ----------
-    experiment
-        The output.
-    number
-        Its number.
-    """
+    """Each hold, with the restart after it."""
     rows = []
     stages = experiment.stages
     for index, hold in enumerate(stages):

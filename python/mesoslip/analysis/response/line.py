@@ -6,22 +6,16 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from mesoslip.array_types import Array
 
 
 @dataclass(frozen=True)
 class Line:
-    """A straight line by weighted least squares.
+    """A straight line by weighted least squares: slope, its standard error, and value at 0.
 
-    Attributes
-    ----------
-    slope, slope_error, level
-        Slope, its standard error, and value at 0. The error is multiplied by √(χ²/degrees of
-        freedom) if that is more than 1; that of two points follows from their errors.
-    chi_square, degrees_of_freedom
-        χ² with the errors of the points; NaN for points without errors.
+    The error is multiplied by √(χ²/degrees of freedom) if that is more than 1; that of two points
+    follows from their errors. χ² is NaN for points without errors.
     """
 
     slope: float

@@ -13,11 +13,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mesoslip.analysis.experiment_stages import Array, Experiment, Stage
+from mesoslip.analysis.experiment_stages import Experiment, Stage
 from mesoslip.analysis.response.columns import LOAD_STEPS, empty_row
 from mesoslip.analysis.response.decay import decay
-from mesoslip.analysis.response.scatter import error_of_mean
-from mesoslip.analysis.steady_force import steady_mean
+from mesoslip.analysis.steady_force import error_of_mean, steady_mean
+from mesoslip.array_types import Array
 
 # Minimum change of the load from sample to sample in a step: over the load, and over the median of
 # such changes, which are those of the noise.
@@ -43,15 +43,7 @@ class _Step(NamedTuple):
 
 
 def load_step_rows(experiment: Experiment, number: int) -> list[dict[str, Any]]:
-    """Each step of the normal load in a stage of constant velocity.
-
-    Parameters
-    ----------
-    experiment
-        The output.
-    number
-        Its number.
-    """
+    """Each step of the normal load in a stage of constant velocity."""
     if experiment.normal_force is None:
         return []
     load = experiment.normal_force.mean(axis=0)

@@ -18,15 +18,7 @@ if TYPE_CHECKING:
 
 
 def steady_rows(experiment: Experiment, number: int) -> list[dict[str, Any]]:
-    """The steady force of each stage at constant velocity.
-
-    Parameters
-    ----------
-    experiment
-        The output.
-    number
-        Its number.
-    """
+    """The steady force of each stage at constant velocity."""
     if experiment.has_strokes:
         return _stroke_rows(experiment, number)
     rows = []

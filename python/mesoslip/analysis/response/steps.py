@@ -10,8 +10,7 @@ import numpy as np
 from mesoslip.analysis.experiment_stages import Experiment, Peak, Stage
 from mesoslip.analysis.response.columns import STEPS, empty_row
 from mesoslip.analysis.response.decay import decay
-from mesoslip.analysis.response.scatter import error_of_mean
-from mesoslip.analysis.steady_force import SteadyMean
+from mesoslip.analysis.steady_force import SteadyMean, error_of_mean
 from mesoslip.quantities import with_unit
 
 # Minimum height of a peak above the steady force, in standard deviations of the force.
@@ -25,15 +24,7 @@ MIN_AMPLITUDE = 3.0
 
 
 def step_rows(experiment: Experiment, number: int) -> list[dict[str, Any]]:
-    """Each step from one velocity to another.
-
-    Parameters
-    ----------
-    experiment
-        The output.
-    number
-        Its number.
-    """
+    """Each step from one velocity to another."""
     rows = []
     for before, after in zip(experiment.stages, experiment.stages[1:], strict=False):
         if not (before.is_steady and after.is_steady) or before.velocity == after.velocity:

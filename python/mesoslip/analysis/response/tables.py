@@ -19,15 +19,7 @@ Row = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class ResponseTable(PrintedTable):
-    """A table of a response.
-
-    Attributes
-    ----------
-    notes
-        A note on each row; empty if there is none.
-    line
-        Slope of the line through the rows, as a sentence; empty if there is none.
-    """
+    """A table of a response, with a note on each row, and the slope of its line in words."""
 
     notes: tuple[str, ...]
     line: str = ""
@@ -35,26 +27,10 @@ class ResponseTable(PrintedTable):
 
 @dataclass(frozen=True)
 class _Column:
-    """A column of a table.
+    """A column: header, name of the variable, and SI unit, without which values are texts.
 
-    Attributes
-    ----------
-    header
-        The header, without unit.
-    name
-        Name of the variable.
-    unit
-        SI unit; without one the values are texts.
-    error
-        Name of the variable with the standard errors.
-    beside
-        Variables of other columns with the same unit and decimals.
-    digits
-        Significant digits of values without error.
-    is_optional
-        Whether the column is left out if it has no values.
-    is_stage
-        Whether it has numbers of stages, -1 for all of them.
+    Values have the digits of the errors, and share unit and decimals with the variables ``beside``
+    it. An optional column without values is left out. Numbers of stages are -1 for all of them.
     """
 
     header: str
@@ -133,13 +109,7 @@ def _size(force: float) -> str:
 
 
 def tables(tree: Tree) -> list[ResponseTable]:
-    """Tables of a response, without the empty ones.
-
-    Parameters
-    ----------
-    tree
-        The result of `mesoslip.response`.
-    """
+    """Tables of the result of `mesoslip.response`, without the empty ones."""
     suffix = (
         "coefficient"
         if tree.attrs.keys() & {"normal_force", "force_unit"}

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from mesoslip.analysis.alternating_extremes import Samples
 from mesoslip.analysis.sampled_slips.levels import Level
-
-Array = NDArray[np.float64]
+from mesoslip.array_types import Array
 
 # Ratio of thresholds for which slips are counted.
 THRESHOLD_RATIO = 1.25

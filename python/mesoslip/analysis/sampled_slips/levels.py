@@ -9,14 +9,12 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mesoslip.analysis.alternating_extremes import Extremes, Samples, extremes_of
 from mesoslip.analysis.noise import Part, TraceNoise, parts_of
 from mesoslip.analysis.sampled_slips.ratios import Ratios
 from mesoslip.analysis.sampled_slips.windows import Windows
-
-Array = NDArray[np.float64]
+from mesoslip.array_types import Array
 
 # Minimum fall over the range of the force, as forces have rounding errors.
 MIN_HEIGHT = 1e-3

@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mesoslip.analysis.alternating_extremes import Samples
 from mesoslip.analysis.sampled_slips.windows import Windows
-
-Array = NDArray[np.float64]
+from mesoslip.array_types import Array
 
 # Part below the maximum, over the smaller one of rise and fall, in which durations are compared,
 # and maximum of their ratio.
@@ -55,16 +53,14 @@ class Ratios:
         return self._values[at]
 
     def _key(self, tops: Samples, bottoms: Samples) -> Samples:
-        keys: Samples = tops * self.force.size + bottoms
-        return keys
+        return tops * self.force.size + bottoms
 
     def _computed(self, tops: Samples, bottoms: Samples, lows: Samples) -> Array:
         force = self.force
         height = force[tops] - np.maximum(force[lows], force[bottoms])
         rises = self._durations(Windows(tops, tops - lows + 1, -1), height)
         falls = self._durations(Windows(tops, bottoms - tops + 1), height)
-        ratios: Array = np.minimum(MAX_RATIO, rises / falls)
-        return ratios
+        return np.minimum(MAX_RATIO, rises / falls)
 
     def _durations(self, windows: Windows, height: Array) -> Array:
         """Time from the last sample near the maximum to the first one far below it."""

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip.analysis.alternating_extremes import Samples
+from mesoslip.array_types import Array
 
-Array = NDArray[np.float64]
 Value = TypeVar("Value", bound=np.generic)
 
 # Number of samples that are evaluated at once.
@@ -56,8 +56,7 @@ class Windows:
 
     def max_of(self, values: NDArray[Value]) -> NDArray[Value]:
         """The maximum of values of ``samples`` in each window."""
-        found: NDArray[Value] = np.maximum.reduceat(values, self.starts)
-        return found
+        return np.maximum.reduceat(values, self.starts)
 
     def mean_of(self, values: Array) -> Array:
         """The mean of values of ``samples`` in each window."""

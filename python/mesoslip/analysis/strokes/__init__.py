@@ -3,7 +3,6 @@ measured properties of strokes and cycles."""
 
 from mesoslip.analysis.strokes.catalogue import (
     Strokes,
-    check_middle,
     strokes,
     strokes_from,
     strokes_of,
@@ -28,7 +27,6 @@ __all__ = [
     "Strokes",
     "along",
     "back_and_forth",
-    "check_middle",
     "find_slips_between_reversals",
     "found_period",
     "friction_map",

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,19 +17,55 @@ from mesoslip.analysis.strokes.cycles import Cycle, Overall, cycles_of, overall
 from mesoslip.analysis.strokes.measure import MIDDLE, Measured, Stroke, measure_all
 from mesoslip.analysis.strokes.record import StrokeRecord, record_of
 from mesoslip.analysis.strokes.revolutions import found_period, has_rotation, revolutions_of
-from mesoslip.analysis.strokes.variables import CYCLES, STROKES, unit_of
+from mesoslip.array_types import DataTree
 from mesoslip.errors import ConfigError, FileError, Problem
 from mesoslip.output.arrays import Tree
 from mesoslip.output.inputs import OutputLike, opened_run_arrays
-from mesoslip.output.table_files import PrintedTable
-from mesoslip.output.targets import written_whole
-from mesoslip.output.variables import FORCES, Group
+from mesoslip.output.table_files import PrintedTable, rows_of, write_tables
+from mesoslip.output.variables import (
+    REALIZATION_INDEX,
+    Estimate,
+    Group,
+    Meaning,
+    force_among,
+    with_force_unit,
+)
 from mesoslip.quantities import with_error, with_unit
 
-if TYPE_CHECKING:
-    import xarray as xr
+STROKES = Group(
+    realization_index=REALIZATION_INDEX,
+    stroke_number=Meaning("1", "number of the stroke, from 1", np.int64),
+    start_time=Meaning("s", "time of the reversal before the stroke"),
+    end_time=Meaning("s", "time of the reversal after it"),
+    direction=Meaning(
+        "1", "direction of the motion, or of the force where that is unknown", np.int64
+    ),
+    length=Meaning("m", "distance between the reversals"),
+    velocity=Meaning("m s-1", "mean speed in the middle of the stroke"),
+    mean_friction=Estimate("N", "mean force along the motion in the middle of the stroke"),
+    mean_friction_coefficient=Estimate("1", "the same over the mean normal force there"),
+    max_friction=Meaning("N", "maximum force along the motion"),
+    max_friction_position=Meaning("m", "distance from the reversal to this maximum"),
+    start_force=Meaning("N", "force at the reversal before the stroke"),
+    end_force=Meaning("N", "force at the reversal after it"),
+    stiffness=Estimate("N m-1", "stiffness at the reversal before the stroke"),
+    slides=Meaning(
+        "1", "whether there is sliding friction (1), or the force only grows (0)", np.int64
+    ),
+)
 
-Array = NDArray[np.float64]
+CYCLES = Group(
+    realization_index=REALIZATION_INDEX,
+    cycle_number=Meaning("1", "number of the cycle, from 1", np.int64),
+    start_time=Meaning("s", "time of the reversal before the cycle"),
+    end_time=Meaning("s", "time of the reversal after it"),
+    mean_friction=Estimate("N", "half the difference of the mean forces in both directions"),
+    mean_friction_coefficient=Estimate("1", "the same over the mean normal force"),
+    loop_energy=Estimate("J", "energy dissipated in the cycle, the area of its loop"),
+    offset=Estimate("N", "offset of the force, half the sum of the means in both directions"),
+    stiffness=Estimate("N m-1", "mean stiffness at both reversals"),
+)
+
 
 # Printed columns: header, and SI unit.
 STROKE_HEADS = {
@@ -56,8 +91,6 @@ CYCLE_HEADS = {
 }
 # Quantities over all cycles.
 OVERALL = ("mean_friction", "mean_friction_coefficient", "loop_energy", "offset", "stiffness")
-# Units for print where the force is a coefficient.
-COEFFICIENTS = {"N": "1", "N/m": "1/m", "J": "m"}
 
 
 @dataclass(frozen=True)
@@ -80,21 +113,13 @@ class Strokes:
 
     def rows(self, group: str) -> list[dict[str, Any]]:
         """A dictionary for each stroke or cycle; None for unknown values."""
-        columns = self.columns[group]
-        lists = [column.tolist() for column in columns.values()]
-        return [
-            {
-                name: None if value != value else value
-                for name, value in zip(columns, row, strict=True)
-            }
-            for row in zip(*lists, strict=True)
-        ]
+        return rows_of(self.columns[group])
 
     @property
     def tables(self) -> list[PrintedTable]:
         """Strokes, cycles, and the means over cycles, for print."""
         tables = [
-            printed_columns(title, self.columns[group], heads, self._unit)
+            printed_columns(title, self.columns[group], heads, self.force_unit)
             for title, group, heads in (
                 ("Strokes", "strokes", STROKE_HEADS),
                 ("Cycles", "cycles", CYCLE_HEADS),
@@ -104,7 +129,7 @@ class Strokes:
             rows = []
             for name, one in self.overall.items():
                 head, unit = CYCLE_HEADS[name]
-                unit = self._unit(unit)
+                unit = with_force_unit(unit, self.force_unit)
                 rows.append(
                     (
                         head,
@@ -118,27 +143,13 @@ class Strokes:
             tables.append(PrintedTable("Means over cycles", heads, tuple(rows)))
         return tables
 
-    def _unit(self, unit: str) -> str:
-        return COEFFICIENTS.get(unit, unit) if self.force_unit == "1" else unit
-
     def write_csv(self, path: Path) -> None:
         """Write strokes and cycles as two tables, with an empty line between them."""
-        with written_whole(path) as part, part.open("w", newline="", encoding="utf-8") as file:
-            for number, (group, meanings) in enumerate((("strokes", STROKES), ("cycles", CYCLES))):
-                file.write("\n" if number else "")
-                writer = csv.DictWriter(file, list(meanings))
-                units = {
-                    name: unit_of(one.units, self.force_unit) for name, one in meanings.items()
-                }
-                writer.writerow({name: f"{name} [{unit}]" for name, unit in units.items()})
-                writer.writerows(self.rows(group))
+        groups = (("strokes", STROKES), ("cycles", CYCLES))
+        write_tables([(self.rows(name), one.units(self.force_unit)) for name, one in groups], path)
 
     def to_json(self) -> dict[str, Any]:
         """Everything as nested lists and numbers."""
-        found = {
-            name: {key: getattr(one, key) for key in one.__dataclass_fields__}
-            for name, one in self.overall.items()
-        }
         return {
             "source": self.source,
             "force_unit": self.force_unit,
@@ -146,7 +157,7 @@ class Strokes:
             "notes": self.notes,
             "strokes": self.rows("strokes"),
             "cycles": self.rows("cycles"),
-            "overall": found,
+            "overall": {name: asdict(one) for name, one in self.overall.items()},
         }
 
 
@@ -172,7 +183,7 @@ def strokes_of(
     guess = ""
     if period == "auto":
         root = tree.to_dataset()
-        force = root[next(one for one in FORCES if one in root)].values[realization or 0]
+        force = root[force_among(root)].values[realization or 0]
         known = np.isfinite(force)
         period = found_period(root["time"].values[known], force[known])
         if period is None:
@@ -243,7 +254,7 @@ def _columns(
     }
 
 
-def strokes_from(tree: xr.DataTree) -> Strokes:
+def strokes_from(tree: DataTree) -> Strokes:
     """The strokes that `strokes` returned, without means over cycles."""
     columns = {
         group: {str(name): one.values for name, one in tree[group].data_vars.items()}
@@ -256,7 +267,7 @@ def strokes_from(tree: xr.DataTree) -> Strokes:
 
 def strokes(
     output: OutputLike, *, middle: float = MIDDLE, period: float | Literal["auto"] | None = None
-) -> xr.DataTree:
+) -> DataTree:
     """The strokes of a record that goes back and forth, or the revolutions of a disc.
 
     Parts of strokes at either end of the record are left out.
@@ -295,31 +306,16 @@ def strokes(
     """
     import xarray as xr
 
-    check_middle("middle", middle)
+    if not 0 < middle <= 1:
+        raise ConfigError([Problem("", "middle", "must be between 0 and 100 %", middle)])
     if period not in {None, "auto"} and not 0 < float(period or 0) < math.inf:
         raise ConfigError([Problem("", "period", "must be a time above 0", period)])
     with opened_run_arrays(output) as tree:
         found = strokes_of(tree, middle, period=period)
-    groups: dict[str, xr.Dataset] = {}
-    for group, meanings, dimension in (("strokes", STROKES, "stroke"), ("cycles", CYCLES, "cycle")):
-        variables = {
-            name: meanings.variable(name, (dimension,), values)
-            for name, values in found.columns[group].items()
-        }
-        for one in variables.values():
-            one.attrs["units"] = unit_of(one.attrs["units"], found.force_unit)
-        groups[group] = xr.Dataset(variables)
-    attributes = {
-        "source": found.source,
-        "middle": middle,
-        "notes": "\n".join(found.notes),
+    groups = {
+        name: group.dataset((dimension,), found.columns[name], found.force_unit)
+        for name, group, dimension in (("strokes", STROKES, "stroke"), ("cycles", CYCLES, "cycle"))
     }
     result = xr.DataTree.from_dict(groups)
-    result.attrs.update(attributes)
+    result.attrs |= {"source": found.source, "middle": middle, "notes": "\n".join(found.notes)}
     return result
-
-
-def check_middle(key: str, middle: float) -> None:
-    """Check that the middle is a share of a stroke."""
-    if not 0 < middle <= 1:
-        raise ConfigError([Problem("", key, "must be between 0 and 100 %", middle)])

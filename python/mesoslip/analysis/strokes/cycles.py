@@ -8,13 +8,11 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mesoslip.analysis.steady_force import steady_mean, transient
-from mesoslip.analysis.strokes.measure import NORMAL_95, Measured, Stroke
+from mesoslip.analysis.steady_force import NORMAL_95, steady_mean, transient
+from mesoslip.analysis.strokes.measure import Measured, Stroke
 from mesoslip.analysis.strokes.record import StrokeRecord
-
-Array = NDArray[np.float64]
+from mesoslip.array_types import Array
 
 # Minimum number of cycles for a drift, and for the length of the running-in.
 MIN_DRIFT, MIN_RUNNING_IN = 4, 10
@@ -57,7 +55,7 @@ def _cycle(record: StrokeRecord, one: Stroke, two: Stroke) -> Cycle:
         _half(one.mean_friction_coefficient, two.mean_friction_coefficient),
         _loop_energy(record, one, two),
         offset.over(sign),
-        _half(one.stiffness, two.stiffness) if _both(one, two) else _known(one, two),
+        _known(one.stiffness, two.stiffness),
     )
 
 
@@ -70,12 +68,11 @@ def _half(one: Measured, two: Measured) -> Measured:
     )
 
 
-def _both(one: Stroke, two: Stroke) -> bool:
-    return math.isfinite(one.stiffness.value + two.stiffness.value)
-
-
-def _known(one: Stroke, two: Stroke) -> Measured:
-    return one.stiffness if math.isfinite(one.stiffness.value) else two.stiffness
+def _known(one: Measured, two: Measured) -> Measured:
+    """Half the sum of two values, or the one that is known."""
+    if math.isfinite(one.value + two.value):
+        return _half(one, two)
+    return one if math.isfinite(one.value) else two
 
 
 def _loop_energy(record: StrokeRecord, one: Stroke, two: Stroke) -> Measured:

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from mesoslip.analysis.strokes.measure import Stroke
 from mesoslip.analysis.strokes.record import StrokeRecord
-
-Array = NDArray[np.float64]
+from mesoslip.array_types import Array
 
 # Maximum number of bins along a stroke, and minimum mean number of samples in one.
 MAX_BINS, MIN_SAMPLES = 80, 3

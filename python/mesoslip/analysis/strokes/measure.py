@@ -14,13 +14,11 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mesoslip.analysis.steady_force import MARGIN, MAX_DISCARDED, steady_mean, transient
+from mesoslip.analysis.steady_force import MARGIN, MAX_DISCARDED, NORMAL_95, steady_mean, transient
 from mesoslip.analysis.strokes.record import StrokeRecord
 from mesoslip.analysis.strokes.segments import Piece
-
-Array = NDArray[np.float64]
+from mesoslip.array_types import Array
 
 # Share of a stroke that is its middle.
 MIDDLE = 0.8
@@ -30,8 +28,6 @@ MIN_SAMPLES = 3
 # level of sliding is, the minimum share of the middle without reversal, and the maximum slope of
 # the force there, over that of the reversal, and growth over its swing.
 REVERSAL, LAST, MIN_SLIDING, MAX_SLOPE, MAX_GROWTH = 1.1, 1 / 4, 0.15, 0.1, 0.25
-# Half the width of a 95 % interval over the standard error.
-NORMAL_95 = 1.96
 # Samples over which the maximum is a mean: a share of the stroke, and the maximum number.
 PEAK_SHARE, MAX_PEAK = 0.01, 9
 # Shares of the swing at a reversal over which lines are fitted, the longest first; minimum number

@@ -7,17 +7,15 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mesoslip.analysis.noise import noise_level, without_impulses
 from mesoslip.analysis.strokes.segments import FORCE, POSITIONS, Piece, output_pieces
 from mesoslip.analysis.strokes.sliding import polarity
+from mesoslip.array_types import Array
 from mesoslip.errors import FileError
 from mesoslip.output.access import group_of
 from mesoslip.output.arrays import Tree
-from mesoslip.output.variables import FORCES
-
-Array = NDArray[np.float64]
+from mesoslip.output.variables import force_among
 
 
 @dataclass(frozen=True)
@@ -110,7 +108,7 @@ def record_in(
 ) -> StrokeRecord:
     """A realization of an output, cut into pieces."""
     root = tree.to_dataset()
-    force = root[next(one for one in FORCES if one in root)].values[realization].astype(float)
+    force = root[force_among(root)].values[realization].astype(float)
     known = np.flatnonzero(np.isfinite(force))
     count = int(known[-1]) + 1
     time, force = root["time"].values[:count], force[:count]

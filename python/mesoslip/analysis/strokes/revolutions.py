@@ -10,17 +10,15 @@ import math
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mesoslip.analysis.strokes.cycles import Cycle
 from mesoslip.analysis.strokes.measure import Measured, Stroke, mean_of
 from mesoslip.analysis.strokes.record import StrokeRecord, record_in
 from mesoslip.analysis.strokes.segments import Piece
+from mesoslip.array_types import Array
 from mesoslip.errors import FileError
 from mesoslip.output.arrays import Tree
 from mesoslip.quantities import with_unit
-
-Array = NDArray[np.float64]
 
 # Minimum correlation of a revolution with the next ones.
 MIN_CORRELATION = 0.3

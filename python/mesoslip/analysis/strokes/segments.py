@@ -14,14 +14,12 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mesoslip.analysis.alternating_extremes import Extremes, Samples, extremes_of
 from mesoslip.analysis.noise import noise_level
+from mesoslip.array_types import Array
 from mesoslip.output.arrays import Tree
-from mesoslip.output.variables import FORCES
-
-Array = NDArray[np.float64]
+from mesoslip.output.variables import force_among
 
 # Motions that are given.
 STROKES, ONE_WAY = "strokes", "one-way"
@@ -91,7 +89,7 @@ def record_pieces(
 def output_pieces(tree: Tree, realization: int = 0) -> tuple[tuple[Piece, ...] | None, str]:
     """Pieces of a realization of an output, and the quantity in which they were found."""
     root = tree.to_dataset()
-    force = root[next(one for one in FORCES if one in root)].values[realization]
+    force = root[force_among(root)].values[realization]
     drive, displacement = (
         root[one].values[realization] if one in root else None for one in POSITIONS.values()
     )

@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip.analysis.strokes.segments import Piece
-
-Array = NDArray[np.float64]
+from mesoslip.array_types import Array
 
 # Share of a piece, in its middle, whose median is the level at which sliding begins.
 MIDDLE = 0.8

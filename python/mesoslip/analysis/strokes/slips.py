@@ -13,14 +13,12 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mesoslip.analysis.noise import TraceNoise, estimate_noise
 from mesoslip.analysis.sampled_slips import FoundSlips, find_slips
 from mesoslip.analysis.strokes.segments import Piece
 from mesoslip.analysis.strokes.sliding import sliding_of
-
-Array = NDArray[np.float64]
+from mesoslip.array_types import Array
 
 # Samples at the end of a piece that belong to the reversal.
 END = 2

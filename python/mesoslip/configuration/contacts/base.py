@@ -197,7 +197,7 @@ def common_parameters(config: Setting) -> Parameters:
         "reattach": int(contacts.reattach),
         **_blocks(config),
         **contacts.threshold.kernel_parameters,
-        **_kept(contacts),
+        **({} if contacts.renewal == "redraw" else {"keeps_thresholds": 1}),
         **_track(contacts),
     }
 
@@ -212,11 +212,6 @@ def _blocks(config: Setting) -> Parameters:
         "block_counts": tuple(counts.tolist()),
         "block_spacing": config.slider.block_spacing,
     }
-
-
-def _kept(contacts: Contacts) -> Parameters:
-    """Parameters of contacts that keep their thresholds."""
-    return {} if contacts.renewal == "redraw" else {"keeps_thresholds": 1}
 
 
 def _track(contacts: Contacts) -> Parameters:

@@ -8,7 +8,8 @@ from typing import ClassVar
 import numpy as np
 
 from mesoslip.configuration.contacts.ageing import age_problems, ageing_of
-from mesoslip.configuration.contacts.base import ContactKind, Setting, common_parameters
+from mesoslip.configuration.contacts.base import Setting
+from mesoslip.configuration.contacts.ensemble import EnsembleContacts
 from mesoslip.configuration.contacts.populations import PopulationContacts
 from mesoslip.configuration.contacts.tables.contacts import Contacts
 from mesoslip.configuration.contacts.tables.thermal import Thermal
@@ -83,30 +84,17 @@ def _idle_life(contacts: Contacts, thermal: Thermal, duration: float) -> float:
     return float(np.sum(steps * np.exp(-hazard[:-1]) * share))
 
 
-class ThermalContacts(ContactKind):
+class ThermalContacts(EnsembleContacts):
     """Independent contacts that break by thermal activation, simulated one by one."""
 
     kernel_kind: ClassVar[str] = "thermal"
-    engine: ClassVar[str] = "eq"
     features: ClassVar[frozenset[str]] = frozenset({"contacts.thermal"})
 
-    @property
-    def bytes_per_contact(self) -> int:
-        return 260 if self.on_lattice else 150
-
     def kernel_parameters(self, config: Setting) -> Parameters:
-        columns = rows = 0
-        if self.interaction is not None:
-            columns, rows = self.interaction.columns, self.interaction.rows
-        return (
-            common_parameters(config)
-            | {"columns": columns, "rows": rows}
-            | thermal_parameters(config)
-        )
+        return super().kernel_parameters(config) | thermal_parameters(config)
 
     def _problems(self, config: Setting) -> Complaints:
-        if self.interaction is not None:
-            yield from self.interaction.problems(config.contacts)
+        yield from super()._problems(config)
         yield from thermal_problems(config)
 
 

@@ -43,8 +43,9 @@ def blocks_of(
         return
     above = b""
     lines = 0
+    unpacked: Any = COMPRESSIONS[name][1] if name else nullcontext
     try:
-        with path.open("rb") as file, _unpacked(name, file) as stream:
+        with path.open("rb") as file, unpacked(file) as stream:
             for data in _pieces(stream):
                 text = text_of(path, data, "text")
                 table = read_text(path, above + text, decimal=decimal, has_headers=has_headers)
@@ -56,11 +57,6 @@ def blocks_of(
                 yield table
     except (EOFError, OSError, lzma.LZMAError) as error:
         raise FileError(f"{path}: cannot be read: {error}") from None
-
-
-def _unpacked(compression: str, file: IO[bytes]) -> Any:
-    """The text of a file, which may be compressed."""
-    return COMPRESSIONS[compression][1](file) if compression else nullcontext(file)
 
 
 def _pieces(stream: IO[bytes]) -> Iterator[bytes]:

@@ -18,17 +18,11 @@ from typing import overload
 import numpy as np
 from numpy.typing import NDArray
 
+from mesoslip.array_types import Array
 from mesoslip.errors import FileError, shown
-from mesoslip.measured.reading.cells import (
-    COMMENT,
-    Clock,
-    hint_for,
-    is_missing,
-    is_number,
-    split,
-)
+from mesoslip.measured.reading.cells import COMMENT, Clock, hint_for, is_missing, is_number, split
 from mesoslip.measured.reading.layout import Layout, check_decimal_comma, find_layout, header_cells
-from mesoslip.measured.reading.table import Array, BadCell, Table, listed
+from mesoslip.measured.reading.table import BadCell, Table, listed
 
 # Maximum share of rows with fewer cells than others.
 MAX_SHORT = 0.05

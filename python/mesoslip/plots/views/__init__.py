@@ -7,15 +7,12 @@ from __future__ import annotations
 
 import pkgutil
 from importlib import import_module
-from typing import TYPE_CHECKING
 
+from mesoslip.array_types import DataTree
 from mesoslip.errors import ConfigError, FileError, Problem
 from mesoslip.output.arrays import Tree
 from mesoslip.output.kinds import KINDS, kind_of
 from mesoslip.plots.views.base import Options, View
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 VIEWS: tuple[View, ...] = tuple(
     import_module(f"{__name__}.{file.name}").VIEW
@@ -39,7 +36,7 @@ def takes_arrays(tree: Tree, name: str | None) -> bool:
     )
 
 
-def view_of(tree: xr.DataTree, name: str | None, options: Options) -> View:
+def view_of(tree: DataTree, name: str | None, options: Options) -> View:
     """The view of an output, by default that of its kind, which has the options."""
     kind = kind_of(tree)
     there = [one for one in VIEWS if one.kind == kind and one.name == (name or kind)]

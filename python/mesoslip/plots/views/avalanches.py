@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from mesoslip.analysis.avalanche_sizes import PowerLawFit, ccdf, fit_power_law, logarithmic_bins
 from mesoslip.analysis.avalanches import NO_AVALANCHES, failures
+from mesoslip.array_types import Array, DataTree
 from mesoslip.errors import FileError
 from mesoslip.output.access import group_of
 from mesoslip.plots.style import (
@@ -25,18 +26,13 @@ from mesoslip.plots.style import (
 from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import percent, with_error
 
-if TYPE_CHECKING:
-    import xarray as xr
-
-Array = NDArray[np.float64]
-
 # Probability beyond either end of an interval of one standard deviation.
 TAIL = 0.1587
 # Cutoffs of the fitted laws in formulas, by the exponent of s/s_c.
 CUTOFFS = {1.0: "e^{-s/s_c}", 2.0: "e^{-(s/s_c)^2}"}
 
 
-def draw(tree: xr.DataTree, options: Options, figure: Canvas | None) -> Canvas:
+def draw(tree: DataTree, options: Options, figure: Canvas | None) -> Canvas:
     """Density and complementary cumulative distribution of the sizes of avalanches."""
     sizes = scaling_sizes(tree)
     figure, (density, cumulative) = side_by_side(figure, (6.5, 3))
@@ -47,7 +43,7 @@ def draw(tree: xr.DataTree, options: Options, figure: Canvas | None) -> Canvas:
     return figure
 
 
-def draw_density(axes: Axes, tree: xr.DataTree, _: Options) -> None:
+def draw_density(axes: Axes, tree: DataTree, _: Options) -> None:
     """Draw the density of the sizes of avalanches, and the power law fitted to them."""
     sizes = scaling_sizes(tree)
     fit = fit_power_law(sizes)
@@ -72,7 +68,7 @@ def _describe(fit: PowerLawFit, part: float) -> str:
 
 
 def compare(
-    trees: Sequence[xr.DataTree],
+    trees: Sequence[DataTree],
     labels: Sequence[str],
     options: Options,
     figure: Canvas | None,
@@ -90,7 +86,7 @@ def compare(
 
 
 def compare_densities(
-    axes: Axes, trees: Sequence[xr.DataTree], labels: Sequence[str], _: Options
+    axes: Axes, trees: Sequence[DataTree], labels: Sequence[str], _: Options
 ) -> None:
     """Draw the densities of the sizes of avalanches of several outputs over each other."""
     for number, (tree, label) in enumerate(zip(trees, labels, strict=True)):
@@ -99,13 +95,12 @@ def compare_densities(
     _label_density(axes)
 
 
-def scaling_sizes(tree: xr.DataTree) -> Array:
+def scaling_sizes(tree: DataTree) -> Array:
     """Sizes of the avalanches of an output, without those that broke all remaining contacts."""
     if "avalanches" not in tree.children:
         raise FileError(NO_AVALANCHES)
     data = group_of(tree, "avalanches")
-    sizes: Array = data["size"].values[~failures(tree, data)]
-    return sizes
+    return data["size"].values[~failures(tree, data)]
 
 
 def draw_distribution(

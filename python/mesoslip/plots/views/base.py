@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TypeAlias
 
 from matplotlib.axes import Axes
 
+from mesoslip.array_types import DataTree
 from mesoslip.plots.extent import EVERYTHING, Extent
 from mesoslip.plots.movie import Movie
 from mesoslip.plots.style import Canvas, canvas, shared_legend, styled
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 # Options of a view of a trace.
 EXTENT = frozenset({"realization", "start, end", "x"})
@@ -43,12 +41,10 @@ class Options:
         return {name for name, given in is_given.items() if given}
 
 
-Draw: TypeAlias = "Callable[[xr.DataTree, Options, Canvas | None], Canvas]"
-DrawPanel: TypeAlias = "Callable[[Axes, xr.DataTree, Options], None]"
-Compare: TypeAlias = (
-    "Callable[[Sequence[xr.DataTree], Sequence[str], Options, Canvas | None], Canvas]"
-)
-ComparePanel: TypeAlias = "Callable[[Axes, Sequence[xr.DataTree], Sequence[str], Options], None]"
+Draw: TypeAlias = "Callable[[DataTree, Options, Canvas | None], Canvas]"
+DrawPanel: TypeAlias = "Callable[[Axes, DataTree, Options], None]"
+Compare: TypeAlias = "Callable[[Sequence[DataTree], Sequence[str], Options, Canvas | None], Canvas]"
+ComparePanel: TypeAlias = "Callable[[Axes, Sequence[DataTree], Sequence[str], Options], None]"
 
 
 @dataclass(frozen=True)
@@ -73,16 +69,16 @@ class View:
     """Draws all panels of several outputs; None if there is one."""
     legend_entries: int = 1
     """Entries of each output in the legend of a panel of several."""
-    applies: Callable[[xr.DataTree], bool] = lambda _: True
+    applies: Callable[[DataTree], bool] = lambda _: True
     """Whether it is for an output, where views of one name are for different outputs of a kind."""
-    movie: Callable[[xr.DataTree, Options], Movie] | None = None
+    movie: Callable[[DataTree, Options], Movie] | None = None
     """Makes a movie of an output; None if there is none."""
-    caption: Callable[[xr.DataTree], str] | None = None
+    caption: Callable[[DataTree], str] | None = None
     """Contents of the picture of an output; None if they are those of the summary."""
     takes_arrays: bool = False
     """Whether `mesoslip.output.arrays.Arrays` has all that it needs of an output."""
 
-    def draw(self, tree: xr.DataTree, options: Options, figure: Canvas | None) -> Canvas:
+    def draw(self, tree: DataTree, options: Options, figure: Canvas | None) -> Canvas:
         """Draw an output."""
         with styled():
             if self.draw_all is not None:
@@ -91,7 +87,7 @@ class View:
 
     def compare(
         self,
-        trees: Sequence[xr.DataTree],
+        trees: Sequence[DataTree],
         labels: Sequence[str],
         options: Options,
         figure: Canvas | None,

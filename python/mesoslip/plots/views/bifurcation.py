@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from numbers import Real
-from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
 
 from mesoslip.analysis.return_map import settled_peaks
+from mesoslip.array_types import DataTree
 from mesoslip.configuration.config import Config
 from mesoslip.configuration.differences import flat, is_bookkeeping
 from mesoslip.configuration.keys import key_kind
@@ -20,23 +20,18 @@ from mesoslip.plots.style import BLUE
 from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import scale_for
 
-if TYPE_CHECKING:
-    import xarray as xr
-
 # Key of a single run, or of runs that do not differ.
 DEFAULT_KEY = "drive.velocity"
 # Ratio of the values from which their axis is logarithmic.
 MIN_LOG_RATIO = 5.0
 
 
-def draw_panel(axes: Axes, tree: xr.DataTree, options: Options) -> None:
+def draw_panel(axes: Axes, tree: DataTree, options: Options) -> None:
     """Draw the peaks of a run over the velocity of its drive."""
     draw_peaks(axes, [tree], [""], options)
 
 
-def draw_peaks(
-    axes: Axes, trees: Sequence[xr.DataTree], _: Sequence[str], options: Options
-) -> None:
+def draw_peaks(axes: Axes, trees: Sequence[DataTree], _: Sequence[str], options: Options) -> None:
     """Draw the peaks of the second half of each run over the number in which the runs differ."""
     tables = [flat(Config.from_toml(tree.attrs["configuration"])) for tree in trees]
     key = _differing_key(tables)

@@ -2,22 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
 
+from mesoslip.array_types import Array, Dataset, DataTree
 from mesoslip.plots.logarithmic import logarithmic
 from mesoslip.plots.style import Canvas, canvas, legend_above, titles
 from mesoslip.plots.sweep_axis import DIRECTION_STYLES, SweptKey, scale_of
 from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import scale_for
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-Array = NDArray[np.float64]
 
 # Ratio of the amplitudes of the two directions from which they are different motions.
 DIFFERENT = 2.0
@@ -26,7 +19,7 @@ IRREGULAR = 2
 HEADROOM = 0.08
 
 
-def draw(tree: xr.DataTree, options: Options, figure: Canvas | None) -> Canvas:
+def draw(tree: DataTree, options: Options, figure: Canvas | None) -> Canvas:
     """Amplitude and period of the settled motion over the parameter."""
     data, axis = _data(tree)
     figure = canvas(figure, (6.5, 5.0))
@@ -43,7 +36,7 @@ def draw(tree: xr.DataTree, options: Options, figure: Canvas | None) -> Canvas:
     return figure
 
 
-def draw_amplitude(axes: Axes, tree: xr.DataTree, _: Options) -> None:
+def draw_amplitude(axes: Axes, tree: DataTree, _: Options) -> None:
     """Draw the amplitude over the parameter, with the linear boundary and hysteresis."""
     data, axis = _data(tree)
     ratio, motion = data["amplitude_ratio"].values, data["motion"].values
@@ -78,7 +71,7 @@ def _begin_at_zero(axes: Axes, values: Array) -> None:
     axes.set_ylim(0, (1 + HEADROOM) * float(np.nanmax(values, initial=0.0)) or None)
 
 
-def _data(tree: xr.DataTree) -> tuple[xr.Dataset, SweptKey]:
+def _data(tree: DataTree) -> tuple[Dataset, SweptKey]:
     data = tree.to_dataset()
     return data, SweptKey.of(data[tree.attrs["continued_key"]])
 
@@ -113,7 +106,7 @@ def _mark_boundary(axes: Axes, values: Array, growth: Array) -> None:
         )
 
 
-def _mark_ends(axes: Axes, data: xr.Dataset) -> None:
+def _mark_ends(axes: Axes, data: Dataset) -> None:
     """Mark where oscillations end in smooth sliding, up to their last amplitude."""
     scale = scale_of(data[data.attrs["continued_key"]])
     styles = list(DIRECTION_STYLES.values())

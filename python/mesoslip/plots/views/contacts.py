@@ -3,29 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import StepPatch
 from numpy.typing import NDArray
 
+from mesoslip.array_types import Array, Dataset, DataTree
 from mesoslip.output.access import config_of
 from mesoslip.plots.movie import Movie
-from mesoslip.plots.snapshots import (
-    chosen_snapshot,
-    draw_time_bar,
-    snapshot_frames,
-    snapshots_of,
-)
+from mesoslip.plots.snapshots import chosen_snapshot, draw_time_bar, snapshot_frames, snapshots_of
 from mesoslip.plots.style import BLUE, RED, Canvas, canvas, legend_above, legend_rows
 from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import scale_for, with_unit
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-Array = NDArray[np.float64]
 
 BINS = 80
 # Relative rounding errors of stretches and displacements.
@@ -34,7 +24,7 @@ ROUNDING = 1e-9
 MIN_LOAD = 1e-6
 
 
-def breaking(before: xr.Dataset, after: xr.Dataset | None) -> NDArray[np.bool_]:
+def breaking(before: Dataset, after: Dataset | None) -> NDArray[np.bool_]:
     """Which pinned contacts break before a later snapshot: they do not stretch with the slider."""
     stretch = before["stretch"].values.ravel()
     if after is None:
@@ -47,7 +37,7 @@ def breaking(before: xr.Dataset, after: xr.Dataset | None) -> NDArray[np.bool_]:
     return found
 
 
-def thresholds(tree: xr.DataTree, snapshot: xr.Dataset) -> Array | None:
+def thresholds(tree: DataTree, snapshot: Dataset) -> Array | None:
     """Stretches at which the pinned contacts of a snapshot break [m]; None with interaction."""
     if config_of(tree).contact_kind.has_neighbours:
         return None
@@ -60,7 +50,7 @@ def thresholds(tree: xr.DataTree, snapshot: xr.Dataset) -> Array | None:
 class _Histogram:
     """A histogram of stretches, for one snapshot after another."""
 
-    def __init__(self, axes: Axes, tree: xr.DataTree, data: xr.Dataset) -> None:
+    def __init__(self, axes: Axes, tree: DataTree, data: Dataset) -> None:
         self.tree, self.axes = tree, axes
         config = config_of(tree)
         self.count = config.contacts.count
@@ -98,10 +88,9 @@ class _Histogram:
         legend_above(axes)
 
     def _counts(self, values: Array) -> NDArray[np.intp]:
-        counts: NDArray[np.intp] = np.histogram(values[np.isfinite(values)], self.edges)[0]
-        return counts
+        return np.histogram(values[np.isfinite(values)], self.edges)[0]
 
-    def show(self, snapshot: xr.Dataset, after: xr.Dataset | None) -> None:
+    def show(self, snapshot: Dataset, after: Dataset | None) -> None:
         """Show a snapshot, with the contacts that break before the next one."""
         stretch = snapshot["stretch"].values.ravel()
         is_breaking = breaking(snapshot, after)
@@ -123,7 +112,7 @@ def _steps(edges: Array, color: str, **style: object) -> StepPatch:
     return StepPatch(np.zeros(edges.size - 1), edges, baseline=0, **style)  # type: ignore[arg-type]
 
 
-def _panel(axes: Axes, tree: xr.DataTree, options: Options) -> None:
+def _panel(axes: Axes, tree: DataTree, options: Options) -> None:
     snapshot = chosen_snapshot(tree, options.snapshot)
     data = snapshots_of(tree, snapshot)
     index = int(np.flatnonzero(data["snapshot_time"].values == snapshot["snapshot_time"].item())[0])
@@ -131,14 +120,14 @@ def _panel(axes: Axes, tree: xr.DataTree, options: Options) -> None:
     _Histogram(axes, tree, data.isel(snapshot=[index])).show(snapshot, later)
 
 
-def draw(tree: xr.DataTree, options: Options, figure: Canvas | None) -> Canvas:
+def draw(tree: DataTree, options: Options, figure: Canvas | None) -> Canvas:
     """Stretches of the contacts at a snapshot."""
     figure = canvas(figure, (4.4, 3.2))
     _panel(figure.subplots(), tree, options)
     return figure
 
 
-def movie(tree: xr.DataTree, options: Options) -> Movie:
+def movie(tree: DataTree, options: Options) -> Movie:
     """The stretches at one snapshot after another, above the force over time."""
     data = snapshots_of(tree, chosen_snapshot(tree, options.snapshot))
     frames, times = snapshot_frames(data), data["snapshot_time"].values

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
 
+from mesoslip.array_types import Array, DataTree
 from mesoslip.output.access import config_of
 from mesoslip.plots.style import (
     BLUE,
@@ -23,13 +22,8 @@ from mesoslip.plots.style import (
 from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import Scale, scale_for, with_unit
 
-if TYPE_CHECKING:
-    import xarray as xr
 
-Array = NDArray[np.float64]
-
-
-def draw(tree: xr.DataTree, options: Options, figure: Canvas | None) -> Canvas:
+def draw(tree: DataTree, options: Options, figure: Canvas | None) -> Canvas:
     """Force and slope of the master equation over displacement, with the point of instability."""
     spring = config_of(tree).series_stiffness
     x, _ = _units([tree])
@@ -55,7 +49,7 @@ def draw(tree: xr.DataTree, options: Options, figure: Canvas | None) -> Canvas:
     return figure
 
 
-def draw_curve(axes: Axes, tree: xr.DataTree, _: Options) -> None:
+def draw_curve(axes: Axes, tree: DataTree, _: Options) -> None:
     """Draw the force of the master equation over displacement, with the point of instability."""
     x, force = _units([tree])
     data = tree.to_dataset()
@@ -93,9 +87,7 @@ def draw_curve(axes: Axes, tree: xr.DataTree, _: Options) -> None:
     legend_above(axes)
 
 
-def draw_curves(
-    axes: Axes, trees: Sequence[xr.DataTree], labels: Sequence[str], _: Options
-) -> None:
+def draw_curves(axes: Axes, trees: Sequence[DataTree], labels: Sequence[str], _: Options) -> None:
     """Draw several force curves over each other, each with its point of instability."""
     x, force = _units(trees)
     for number, (tree, label) in enumerate(zip(trees, labels, strict=True)):
@@ -115,7 +107,7 @@ def draw_curves(
     axes.set_xlim(left=0)
 
 
-def _units(trees: Sequence[xr.DataTree]) -> tuple[Scale, Scale]:
+def _units(trees: Sequence[DataTree]) -> tuple[Scale, Scale]:
     """Units of displacement and force that suit all of some curves."""
     data = [tree.to_dataset() for tree in trees]
     x = max(float(one["displacement"].values[-1]) for one in data)
@@ -123,7 +115,7 @@ def _units(trees: Sequence[xr.DataTree]) -> tuple[Scale, Scale]:
     return scale_for(x, "m"), scale_for(force, "N")
 
 
-def _mark_instability(axes: Axes, tree: xr.DataTree, scale: Scale) -> None:
+def _mark_instability(axes: Axes, tree: DataTree, scale: Scale) -> None:
     """Mark X_c over the height of axes."""
     if "X_c" in tree.attrs:
         axes.axvline(tree.attrs["X_c"] / scale.size, color=RED, linewidth=0.7, alpha=0.6, zorder=0)

@@ -3,28 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
 
-from mesoslip.plots.style import (
-    CONTACT,
-    SPRING,
-    Canvas,
-    canvas,
-    curve_style,
-    legend_above,
-    titles,
-)
+from mesoslip.array_types import DataTree
+from mesoslip.plots.style import CONTACT, SPRING, Canvas, canvas, curve_style, legend_above, titles
 from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import Scale, scale_for, with_unit
 
-if TYPE_CHECKING:
-    import xarray as xr
 
-
-def draw(tree: xr.DataTree, options: Options, figure: Canvas | None) -> Canvas:
+def draw(tree: DataTree, options: Options, figure: Canvas | None) -> Canvas:
     """Forces, and the velocity of the slider, over a cycle."""
     data = tree["trace"].to_dataset()
     time, _ = _units([tree])
@@ -41,7 +30,7 @@ def draw(tree: xr.DataTree, options: Options, figure: Canvas | None) -> Canvas:
     return figure
 
 
-def draw_forces(axes: Axes, tree: xr.DataTree, _: Options) -> None:
+def draw_forces(axes: Axes, tree: DataTree, _: Options) -> None:
     """Draw spring and contact force over a cycle."""
     time, force = _units([tree])
     data = tree["trace"].to_dataset()
@@ -54,9 +43,7 @@ def draw_forces(axes: Axes, tree: xr.DataTree, _: Options) -> None:
     legend_above(axes)
 
 
-def draw_cycles(
-    axes: Axes, trees: Sequence[xr.DataTree], labels: Sequence[str], _: Options
-) -> None:
+def draw_cycles(axes: Axes, trees: Sequence[DataTree], labels: Sequence[str], _: Options) -> None:
     """Draw the spring force of several cycles over each other."""
     time, force = _units(trees)
     for number, (tree, label) in enumerate(zip(trees, labels, strict=True)):
@@ -71,7 +58,7 @@ def draw_cycles(
     axes.set_xlabel(time.label("time from the section"))
 
 
-def _summary(tree: xr.DataTree) -> str:
+def _summary(tree: DataTree) -> str:
     """The motion, its period and its leading multiplier."""
     motion = str(tree.attrs["settled_motion"])
     if motion == "smooth":
@@ -81,7 +68,7 @@ def _summary(tree: xr.DataTree) -> str:
     return text if np.isnan(multiplier) else f"{text}, leading multiplier {multiplier:.2g}"
 
 
-def _units(trees: Sequence[xr.DataTree]) -> tuple[Scale, Scale]:
+def _units(trees: Sequence[DataTree]) -> tuple[Scale, Scale]:
     """Units of time and force that suit all of some cycles."""
     data = [tree["trace"].to_dataset() for tree in trees]
     time = max(_largest(one["time"].values) for one in data)

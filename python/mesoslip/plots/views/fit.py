@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import NDArray
 
+from mesoslip.array_types import Array, Dataset, DataTree
 from mesoslip.output.access import trace_suffixes
 from mesoslip.plots.key_names import plain
 from mesoslip.plots.lines import max_size
@@ -19,18 +19,13 @@ from mesoslip.plots.style import BLUE, Canvas, canvas, legend_above
 from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import scale_for
 
-if TYPE_CHECKING:
-    import xarray as xr
-
-Array = NDArray[np.float64]
-
 MEASURED = "black"
 PREDICTED = BLUE
 # Bins of the histograms of slips.
 BINS = 16
 
 
-def draw(tree: xr.DataTree, _: Options, figure: Canvas | None) -> Canvas:
+def draw(tree: DataTree, _: Options, figure: Canvas | None) -> Canvas:
     """Pairs of parameters, the measured and predicted traces, and distributions of their slips."""
     names = list(tree["posterior"].data_vars)
     size, traces = max(2, len(names)), trace_suffixes(tree)
@@ -51,12 +46,12 @@ def draw(tree: xr.DataTree, _: Options, figure: Canvas | None) -> Canvas:
     return figure
 
 
-def draw_trace(axes: Axes, tree: xr.DataTree, _: Options) -> None:
+def draw_trace(axes: Axes, tree: DataTree, _: Options) -> None:
     """Draw the measured trace, the first of several, over the band of predicted ones."""
     _draw_one(axes, tree, "")
 
 
-def _draw_one(axes: Axes, tree: xr.DataTree, after: str) -> None:
+def _draw_one(axes: Axes, tree: DataTree, after: str) -> None:
     """Draw a measured trace, whose groups have names with a suffix."""
     observed = tree[f"observed_data{after}"].to_dataset()["spring_force"]
     predicted = tree[f"posterior_predictive{after}"].to_dataset()["spring_force"]
@@ -80,7 +75,7 @@ def _draw_one(axes: Axes, tree: xr.DataTree, after: str) -> None:
     axes.legend(loc="upper right", ncols=3)
 
 
-def _slips(figure: Canvas, places: Sequence[Any], tree: xr.DataTree, after: str) -> None:
+def _slips(figure: Canvas, places: Sequence[Any], tree: DataTree, after: str) -> None:
     """Draw distributions of the slips, without the first one of each trace."""
     groups = [tree[f"{name}{after}"].to_dataset() for name in ("observed_slips", "predicted_slips")]
     parts = [_later(group) for group in groups]
@@ -120,7 +115,7 @@ def _slips(figure: Canvas, places: Sequence[Any], tree: xr.DataTree, after: str)
             axes.legend(loc="upper left", ncols=2)
 
 
-def _later(group: xr.Dataset) -> tuple[Array, Array, Array]:
+def _later(group: Dataset) -> tuple[Array, Array, Array]:
     """Force before, drop, and waiting time of the slips, without the first one of each trace."""
     owner, start = group["trace"].values, group["start_time"].values
     later = np.diff(owner, prepend=-1) == 0

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import textwrap
-from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
 
+from mesoslip.array_types import DataTree
 from mesoslip.output.access import trace_suffixes
 from mesoslip.plots.key_names import plain
 from mesoslip.plots.lines import max_size
@@ -16,11 +15,6 @@ from mesoslip.plots.printing import is_narrow
 from mesoslip.plots.style import BLUE, RED, Canvas, canvas, legend_above
 from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import scale_for
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-Array = NDArray[np.float64]
 
 MEASURED, PREDICTED, WORST = "black", BLUE, RED
 # Maximum number of summaries that are listed, and end of their axis [spreads].
@@ -32,7 +26,7 @@ CYCLES = 5
 WIDTH = 115
 
 
-def draw(tree: xr.DataTree, _: Options, figure: Canvas | None) -> Canvas:
+def draw(tree: DataTree, _: Options, figure: Canvas | None) -> Canvas:
     """Excerpts of measured and predicted traces, the shapes of slips, and the worst summaries."""
     suffixes = trace_suffixes(tree)
     is_stacked = is_narrow(figure)
@@ -53,7 +47,7 @@ def draw(tree: xr.DataTree, _: Options, figure: Canvas | None) -> Canvas:
     return figure
 
 
-def _title(tree: xr.DataTree, characters: int) -> str:
+def _title(tree: DataTree, characters: int) -> str:
     probability = float(tree.attrs["agreement_probability"])
     groups = ", ".join(str(tree.attrs["disagreeing"]).split("\n"))
     text = f"Agreement of model and trace: p = {probability:.2g}"
@@ -62,7 +56,7 @@ def _title(tree: xr.DataTree, characters: int) -> str:
     return "\n".join(textwrap.wrap(plain(text), characters))
 
 
-def _excerpt(axes: Axes, tree: xr.DataTree, after: str, *, named: bool) -> None:
+def _excerpt(axes: Axes, tree: DataTree, after: str, *, named: bool) -> None:
     """Draw some cycles of the measured trace and of a predicted one, each from one of its slips."""
     observed = tree[f"observed_data{after}"].to_dataset()["spring_force"]
     predicted = tree[f"posterior_predictive{after}"].to_dataset()["spring_force"]
@@ -102,7 +96,7 @@ def _excerpt(axes: Axes, tree: xr.DataTree, after: str, *, named: bool) -> None:
         axes.set_title(plain(str(title)), loc="left")
 
 
-def _shape(axes: Axes, tree: xr.DataTree, number: int) -> None:
+def _shape(axes: Axes, tree: DataTree, number: int) -> None:
     """Draw the mean force during slips, measured and predicted."""
     data = tree["summaries"].to_dataset()
     names = [str(one) for one in data["summary"].values]
@@ -131,7 +125,7 @@ def _shape(axes: Axes, tree: xr.DataTree, number: int) -> None:
     axes.set_ylabel(scale.label("mean along slips"))
 
 
-def draw_scores(axes: Axes, tree: xr.DataTree, _: Options) -> None:
+def draw_scores(axes: Axes, tree: DataTree, _: Options) -> None:
     """Draw the summaries that are farthest from their predictions, with 90 % of these."""
     data = tree["summaries"].to_dataset()
     scores = data["score"].values

@@ -9,20 +9,19 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from mesoslip.analysis.fronts import Fronts, fronts_of
+from mesoslip.array_types import Array
 from mesoslip.errors import FileError
 from mesoslip.output.access import config_of, group_of
 from mesoslip.output.arrays import Tree
 from mesoslip.output.samples import times_of
+from mesoslip.output.variables import force_among
 from mesoslip.plots.axis import HorizontalAxis, time_since
 from mesoslip.plots.curves import curve, draw_curves
 from mesoslip.plots.extent import Extent
 from mesoslip.plots.movie import Movie, chosen_frames, time_bar
 from mesoslip.plots.style import BLUE, RED, SPRING, Canvas, canvas, legend_above, titles
-from mesoslip.plots.trace_variables import driving_force_of
 from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import number, scale_for
-
-Array = NDArray[np.float64]
 
 # Time before and after the fronts of the event that is drawn, over their duration.
 BEFORE, AFTER = 0.08, 0.6
@@ -42,6 +41,11 @@ class Picture(NamedTuple):
     realization: int
     spacing: float
     length: float
+
+    @property
+    def places(self) -> Array:
+        """Middles of the blocks, from the edge [m]."""
+        return np.arange(0.5, round(self.length / self.spacing)) * self.spacing
 
 
 def picture_of(tree: Tree, options: Options) -> Picture:
@@ -117,20 +121,17 @@ def draw_fronts(axes: Axes, tree: Tree, picture: Picture, horizontal: Horizontal
 def _draw_detached(axes: Axes, tree: Tree, picture: Picture, horizontal: HorizontalAxis) -> None:
     """Draw the share of detached contacts of blocks, where there are enough samples."""
     times = times_of(tree)
-    chosen = np.flatnonzero((times >= picture.window[0]) & (times <= picture.window[1]))
-    if chosen.size < MIN_SAMPLES:
+    samples = _samples(times, picture.window, MIN_SAMPLES)
+    if samples is None:
         return
-    step = -(-chosen.size // MAX_SAMPLES)
-    samples = slice(int(chosen[0]), int(chosen[-1]) + 1, step)
     data = group_of(tree, "blocks")["block_detached_contacts"]
     detached = np.asarray(data.isel(realization=picture.realization, time=samples).values)
     config = config_of(tree)
     scale = scale_for(picture.length, "m")
-    blocks = config.slider.block_count
     drawn = axes.pcolormesh(
         (times[samples] - horizontal.origin) / horizontal.scale.size,
-        (np.arange(blocks) + 0.5) * picture.spacing / scale.size,
-        (detached / config.block_shares).T * blocks / config.contacts.count,
+        picture.places / scale.size,
+        (detached / config.block_shares).T * picture.places.size / config.contacts.count,
         cmap="cividis",
         vmin=0,
         vmax=1,
@@ -138,6 +139,14 @@ def _draw_detached(axes: Axes, tree: Tree, picture: Picture, horizontal: Horizon
         rasterized=True,
     )
     axes.figure.colorbar(drawn, ax=axes, label="detached contacts (share)")
+
+
+def _samples(times: NDArray[Any], window: tuple[float, float], least: int) -> slice | None:
+    """Samples in a window of time, up to a maximum number; None for fewer than the least."""
+    chosen = np.flatnonzero((times >= window[0]) & (times <= window[1]))
+    if chosen.size < least:
+        return None
+    return slice(int(chosen[0]), int(chosen[-1]) + 1, -(-chosen.size // MAX_SAMPLES))
 
 
 def draw(tree: Tree, options: Options, figure: Canvas | None) -> Canvas:
@@ -148,7 +157,7 @@ def draw(tree: Tree, options: Options, figure: Canvas | None) -> Canvas:
     draw_panel(above, tree, options)
     window = options.extent.window(tree)
     whole = Extent(picture.realization)
-    name = driving_force_of(tree)
+    name = force_among(tree.data_vars)
     horizontal = time_since(Extent().window(tree))
     draw_curves(below, [curve(tree, name, whole, **SPRING)], name, horizontal, "force")
     for one in picture.window if picture.window != window else ():
@@ -171,15 +180,12 @@ def movie(tree: Any, options: Options) -> Movie:
     picture = picture_of(tree, options)
     times = times_of(tree)
     window = picture.window
-    chosen = np.flatnonzero((times >= window[0]) & (times <= window[1]))
-    if options.extent.is_whole and chosen.size < MIN_SAMPLES:
+    if options.extent.is_whole and _samples(times, window, MIN_SAMPLES) is None:
         # An event between samples: the whole run shows the force before and after it.
         window = options.extent.window(tree)
-        chosen = np.flatnonzero((times >= window[0]) & (times <= window[1]))
-    if chosen.size < 2:
+    samples = _samples(times, window, 2)
+    if samples is None:
         raise FileError("the output has fewer than two samples in the window of time")
-    step = -(-chosen.size // MAX_SAMPLES)
-    samples = slice(int(chosen[0]), int(chosen[-1]) + 1, step)
     group = group_of(tree, "blocks")
     force, velocity = (
         np.asarray(group[name].isel(realization=picture.realization, time=samples).values)
@@ -187,19 +193,16 @@ def movie(tree: Any, options: Options) -> Movie:
     )
     own = times[samples]
     frames = chosen_frames(own, np.abs(np.diff(force, axis=0)).sum(axis=1))
-    config = config_of(tree)
-    blocks = config.slider.block_count
     length = scale_for(picture.length, "m")
-    places = (np.arange(blocks) + 0.5) * picture.spacing / length.size
     figure = canvas(None, (5.0, 5.0))
     panels = figure.subplots(3, 1, height_ratios=[1.3, 1, 1])
     speed = scale_for(float(np.abs(velocity).max()) or 1.0, "m/s")
     lines = []
     for axes, values, label in (
-        (panels[0], force / config.block_strengths, "stress/strength"),
+        (panels[0], force / config_of(tree).block_strengths, "stress/strength"),
         (panels[1], velocity / speed.size, speed.label("velocity")),
     ):
-        (line,) = axes.plot(places, values[0], color="black", linestyle="-")
+        (line,) = axes.plot(picture.places / length.size, values[0], color="black", linestyle="-")
         margin = 0.05 * max(float(np.ptp(values)), 1e-12)
         axes.set_ylim(values.min() - margin, values.max() + margin)
         axes.set_xlim(0, picture.length / length.size)
@@ -208,7 +211,7 @@ def movie(tree: Any, options: Options) -> Movie:
         lines.append((line, values))
     panels[1].set_xlabel(length.label("position, from the edge"))
     horizontal = time_since(window)
-    name = driving_force_of(tree)
+    name = force_among(tree.data_vars)
     near = Extent(picture.realization, *window)
     draw_curves(panels[2], [curve(tree, name, near, **SPRING)], name, horizontal, "force")
     bar = time_bar(panels[2])

@@ -23,12 +23,11 @@ def draw_panel(axes: Axes, tree: Tree, options: Options) -> None:
     end = picture.window[1] + (3 * config.slider.quiet_time if options.extent.is_whole else 0.0)
     high = min(int(np.searchsorted(times, end)), times.size - 1)
     force = group_of(tree, "blocks")["block_contact_force"].isel(realization=picture.realization)
-    blocks, scale = config.slider.block_count, scale_for(picture.length, "m")
-    places = (np.arange(blocks) + 0.5) * picture.spacing / scale.size
+    scale = scale_for(picture.length, "m")
     for index, color, word in ((low, BLUE, "before"), (high, RED, "after")):
         values = np.asarray(force.isel(time=index).values)
         axes.plot(
-            places,
+            picture.places / scale.size,
             values / config.block_strengths,
             ".-",
             color=color,

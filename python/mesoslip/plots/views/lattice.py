@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -12,8 +12,8 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from mesoslip.array_types import Array, Dataset, DataTree
 from mesoslip.errors import FileError
 from mesoslip.plots.movie import MAX_FRAMES, Movie, time_bar
 from mesoslip.plots.printing import is_narrow
@@ -27,11 +27,6 @@ from mesoslip.plots.snapshots import (
 from mesoslip.plots.style import Canvas, canvas
 from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import with_unit
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-Array = NDArray[np.float64]
 
 # Maximum number of contacts that are drawn as polygons; more of them become an image.
 MAX_POLYGONS = 20_000
@@ -47,7 +42,7 @@ TIME_HEIGHT = 1.0
 BLANK = "0.93"
 
 
-def draw(tree: xr.DataTree, options: Options, figure: Canvas | None) -> Canvas:
+def draw(tree: DataTree, options: Options, figure: Canvas | None) -> Canvas:
     """Force over threshold of each contact, and generations of the avalanche before."""
     snapshot = _chosen_lattice(tree, options)
     size = snapshot["avalanche_size"].item()
@@ -66,12 +61,12 @@ def draw(tree: xr.DataTree, options: Options, figure: Canvas | None) -> Canvas:
     return figure
 
 
-def draw_panel(axes: Axes, tree: xr.DataTree, options: Options) -> None:
+def draw_panel(axes: Axes, tree: DataTree, options: Options) -> None:
     """Draw the force over threshold of each contact."""
     _draw_load(axes, _chosen_lattice(tree, options))
 
 
-def movie(tree: xr.DataTree, options: Options) -> Movie:
+def movie(tree: DataTree, options: Options) -> Movie:
     """An avalanche that spreads, or the snapshots one after another with a bar of time."""
     snapshot = _chosen_lattice(tree, options)
     if snapshot["avalanche_size"].item():
@@ -79,7 +74,7 @@ def movie(tree: xr.DataTree, options: Options) -> Movie:
     return _snapshots(tree, snapshot)
 
 
-def _chosen_lattice(tree: xr.DataTree, options: Options) -> xr.Dataset:
+def _chosen_lattice(tree: DataTree, options: Options) -> Dataset:
     snapshot = chosen_snapshot(tree, options.snapshot)
     if not is_on_lattice(snapshot):
         raise FileError(
@@ -89,7 +84,7 @@ def _chosen_lattice(tree: xr.DataTree, options: Options) -> xr.Dataset:
     return snapshot
 
 
-def draw_contacts(axes: Axes, snapshots: xr.Dataset, values: Array, **style: Any) -> Any:
+def draw_contacts(axes: Axes, snapshots: Dataset, values: Array, **style: Any) -> Any:
     """Draw a value of each contact at its site, shape (rows, columns); NaN in light grey."""
     style["cmap"] = mpl.colormaps[style["cmap"]].with_extremes(bad=BLANK)
     x, y = snapshots["x"].values, snapshots["y"].values
@@ -116,7 +111,7 @@ def draw_contacts(axes: Axes, snapshots: xr.Dataset, values: Array, **style: Any
     return polygons
 
 
-def _lattice_size(snapshots: xr.Dataset) -> tuple[float, float]:
+def _lattice_size(snapshots: Dataset) -> tuple[float, float]:
     """Width and height of axes in which the lattice leaves no empty space [inch]."""
     x, y = snapshots["x"].values, snapshots["y"].values
     spacing = x[0, 1] - x[0, 0]
@@ -141,7 +136,7 @@ def _add_colors(axes: Axes, drawn: Any, label: str) -> None:
     axes.figure.colorbar(drawn, ax=axes, label=label, location=location)
 
 
-def _draw_load(axes: Axes, snapshot: xr.Dataset) -> None:
+def _draw_load(axes: Axes, snapshot: Dataset) -> None:
     """Draw the force over threshold of the contacts of a snapshot."""
     load = snapshot["load"].values
     drawn = draw_contacts(axes, snapshot, load, cmap="viridis", norm=_load_range(load))
@@ -150,7 +145,7 @@ def _draw_load(axes: Axes, snapshot: xr.Dataset) -> None:
     axes.set_title(f"snapshot at {time}\ngrey: detached", loc="left")
 
 
-def _draw_generations(axes: Axes, snapshot: xr.Dataset) -> None:
+def _draw_generations(axes: Axes, snapshot: Dataset) -> None:
     """Draw the generation in which each contact of an avalanche broke."""
     generation = snapshot["generation"].values.astype(float)
     generation[generation == 0] = np.nan
@@ -159,7 +154,7 @@ def _draw_generations(axes: Axes, snapshot: xr.Dataset) -> None:
     _add_colors(axes, drawn, "generation")
 
 
-def _spreading(snapshot: xr.Dataset) -> Movie:
+def _spreading(snapshot: Dataset) -> Movie:
     """The avalanche before a snapshot, generation by generation."""
     generation = snapshot["generation"].values.astype(float)
     last = int(generation.max())
@@ -185,7 +180,7 @@ def _spreading(snapshot: xr.Dataset) -> Movie:
     return Movie(figure, len(steps), show)
 
 
-def _snapshots(tree: xr.DataTree, snapshot: xr.Dataset) -> Movie:
+def _snapshots(tree: DataTree, snapshot: Dataset) -> Movie:
     """The snapshots of a realization, above the force over time."""
     data = snapshots_of(tree, snapshot)
     frames = snapshot_frames(data)
@@ -207,7 +202,7 @@ def _snapshots(tree: xr.DataTree, snapshot: xr.Dataset) -> Movie:
     return Movie(figure, len(frames), show)
 
 
-def _panels(snapshot: xr.Dataset) -> tuple[Figure, Axes, Axes]:
+def _panels(snapshot: Dataset) -> tuple[Figure, Axes, Axes]:
     """A figure with axes for the lattice and, below it, for the time."""
     width, height = _lattice_size(snapshot)
     heights = height + OVER_LATTICE, TIME_HEIGHT

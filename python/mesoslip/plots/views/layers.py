@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
-from numpy.typing import NDArray
 
+from mesoslip.array_types import Array, DataTree
 from mesoslip.errors import FileError
 from mesoslip.output.samples import times_of
 from mesoslip.plots.axis import HorizontalAxis, time_since
@@ -23,11 +22,6 @@ from mesoslip.plots.style import BLUE, SPRING, Canvas, canvas, legend_above, tit
 from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import scale_for
 
-if TYPE_CHECKING:
-    import xarray as xr
-
-Array = NDArray[np.float64]
-
 # Maximum number of instants at which the velocities of layers are drawn.
 MAX_INSTANTS = 2000
 NO_LAYERS = (
@@ -36,7 +30,7 @@ NO_LAYERS = (
 )
 
 
-def draw(tree: xr.DataTree, options: Options, figure: Canvas | None) -> Canvas:
+def draw(tree: DataTree, options: Options, figure: Canvas | None) -> Canvas:
     """Velocities of layers over time, above the forces at both ends of the slider."""
     extent = options.extent
     window = _window(tree, extent)
@@ -51,7 +45,7 @@ def draw(tree: xr.DataTree, options: Options, figure: Canvas | None) -> Canvas:
     return figure
 
 
-def draw_waves(axes: Axes, tree: xr.DataTree, options: Options) -> None:
+def draw_waves(axes: Axes, tree: DataTree, options: Options) -> None:
     """Draw the velocity of each layer over time and the number of the layer."""
     extent = options.extent
     window = _window(tree, extent)
@@ -73,7 +67,7 @@ def draw_waves(axes: Axes, tree: xr.DataTree, options: Options) -> None:
 
 
 def _draw_forces(
-    axes: Axes, tree: xr.DataTree, extent: Extent, horizontal: HorizontalAxis, color: str
+    axes: Axes, tree: DataTree, extent: Extent, horizontal: HorizontalAxis, color: str
 ) -> None:
     """Draw the forces at both ends of the slider, that of the contacts in a colour, and inside."""
     curves = [
@@ -84,7 +78,7 @@ def _draw_forces(
     draw_curves(axes, curves, "spring_force", horizontal, "force")
 
 
-def _window(tree: xr.DataTree, extent: Extent) -> tuple[float, float]:
+def _window(tree: DataTree, extent: Extent) -> tuple[float, float]:
     """The window of time of the options, by default around the largest slip."""
     if "layer_displacement" not in tree.data_vars:
         raise FileError(NO_LAYERS)
@@ -97,7 +91,7 @@ def _window(tree: xr.DataTree, extent: Extent) -> tuple[float, float]:
 
 
 def layer_motion(
-    tree: xr.DataTree, extent: Extent, window: tuple[float, float]
+    tree: DataTree, extent: Extent, window: tuple[float, float]
 ) -> tuple[Array, Array]:
     """Times [s], shape (T + 1), and mean velocities of the layers between them [m/s], shape
     (T, layers)."""
@@ -112,7 +106,7 @@ def layer_motion(
     return times, np.diff(data.values, axis=0) / np.diff(times)[:, None]
 
 
-def movie(tree: xr.DataTree, options: Options) -> Movie:
+def movie(tree: DataTree, options: Options) -> Movie:
     """Displacement and velocity of each layer, above the forces over time."""
     window = _window(tree, options.extent)
     times, velocity = layer_motion(tree, options.extent, window)

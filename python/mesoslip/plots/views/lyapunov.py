@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
 
+from mesoslip.array_types import DataTree
 from mesoslip.plots.style import BLUE, Canvas, curve_color, side_by_side, titles
 from mesoslip.plots.views.base import Options, View
 from mesoslip.plots.views.return_map import draw_map
 from mesoslip.quantities import with_error
 
-if TYPE_CHECKING:
-    import xarray as xr
 
-
-def draw(tree: xr.DataTree, options: Options, figure: Canvas | None) -> Canvas:
+def draw(tree: DataTree, options: Options, figure: Canvas | None) -> Canvas:
     """Distances of twins over time, and the return map of peaks beside them."""
     figure, (growth, peaks) = side_by_side(figure, (6.5, 3.2))
     draw_growth(growth, tree, options)
@@ -26,7 +23,7 @@ def draw(tree: xr.DataTree, options: Options, figure: Canvas | None) -> Canvas:
     return figure
 
 
-def draw_growth(axes: Axes, tree: xr.DataTree, _: Options) -> None:
+def draw_growth(axes: Axes, tree: DataTree, _: Options) -> None:
     """Draw the distances of twins over the time since their start, and the mean growth."""
     data = tree.to_dataset()
     times, distances = data["growth_time"].values, data["distance"].values
@@ -53,7 +50,7 @@ def draw_growth(axes: Axes, tree: xr.DataTree, _: Options) -> None:
 
 
 def draw_mean_growth(
-    axes: Axes, trees: Sequence[xr.DataTree], labels: Sequence[str], _: Options
+    axes: Axes, trees: Sequence[DataTree], labels: Sequence[str], _: Options
 ) -> None:
     """Draw the mean growth of several outputs over each other."""
     for number, (tree, label) in enumerate(zip(trees, labels, strict=True)):

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
 
+from mesoslip.array_types import Array, DataTree
 from mesoslip.output.access import config_of
 from mesoslip.plots.style import (
     BLUE,
@@ -22,11 +22,6 @@ from mesoslip.plots.style import (
 from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import scale_for
 
-if TYPE_CHECKING:
-    import xarray as xr
-
-Array = NDArray[np.float64]
-
 # Share of the range of forces from which sequential breaking is visible; range of an inset for it
 # over its own.
 VISIBLE, ENLARGED = 0.1, 1.5
@@ -37,7 +32,7 @@ EQUATIONS: dict[str, dict[str, Any]] = {
 }
 
 
-def draw(tree: xr.DataTree, options: Options, figure: Canvas | None) -> Canvas:
+def draw(tree: DataTree, options: Options, figure: Canvas | None) -> Canvas:
     """Change of the spring force after the onset of slip, beside it with logarithmic axes."""
     solutions = _solutions([tree])
     figure, (linear, *others) = side_by_side(figure, (6.5, 3.2), 2 if solutions else 1)
@@ -77,7 +72,7 @@ def _enlarge_start(axes: Axes, solutions: Sequence[_Solution]) -> None:
     inset.set_title(f"start, {force.name} over {time.name}", fontsize="small", loc="left", pad=2)
 
 
-def draw_drop(axes: Axes, tree: xr.DataTree, options: Options) -> None:
+def draw_drop(axes: Axes, tree: DataTree, options: Options) -> None:
     """Draw the change of the spring force after the onset of slip."""
     draw_drops(axes, [tree], [""], options)
     titles(axes, tree, beside_legend=bool(tree.children))
@@ -89,7 +84,7 @@ def draw_drop(axes: Axes, tree: xr.DataTree, options: Options) -> None:
         axes.text(0.5, 0.6, text, ha="center", va="center", transform=axes.transAxes)
 
 
-def draw_drops(axes: Axes, trees: Sequence[xr.DataTree], labels: Sequence[str], _: Options) -> None:
+def draw_drops(axes: Axes, trees: Sequence[DataTree], labels: Sequence[str], _: Options) -> None:
     """Draw the change of the spring force after several onsets of slip over each other."""
     solutions = _solutions(trees)
     time = scale_for(max((one.times[-1] for one in solutions), default=1.0), "s")
@@ -123,7 +118,7 @@ class _Solution(NamedTuple):
     asymptote: Array
 
 
-def _solutions(trees: Sequence[xr.DataTree]) -> list[_Solution]:
+def _solutions(trees: Sequence[DataTree]) -> list[_Solution]:
     """The solutions of outputs."""
     found = []
     for index, tree in enumerate(trees):

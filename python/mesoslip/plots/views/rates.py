@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
 
-from mesoslip.analysis.apparatus import FORCES
+from mesoslip.array_types import Array, DataTree
+from mesoslip.output.variables import FORCES, force_among
 from mesoslip.plots.key_names import plain
 from mesoslip.plots.parameter_pairs import draw_pairs
 from mesoslip.plots.printing import current, is_narrow
@@ -16,13 +14,8 @@ from mesoslip.plots.style import BLUE, Canvas, canvas
 from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import Scale, scale_for
 
-if TYPE_CHECKING:
-    import xarray as xr
 
-Array = NDArray[np.float64]
-
-
-def draw(tree: xr.DataTree, _: Options, figure: Canvas | None) -> Canvas:
+def draw(tree: DataTree, _: Options, figure: Canvas | None) -> Canvas:
     """Pairs of parameters of the first law, its record with predicted ones, and the residuals."""
     size = len(tree["posterior"].data_vars)
     narrow = is_narrow(figure)
@@ -41,10 +34,10 @@ def draw(tree: xr.DataTree, _: Options, figure: Canvas | None) -> Canvas:
     return figure
 
 
-def _parts(tree: xr.DataTree) -> tuple[Array, Array, Array, Scale, Scale]:
+def _parts(tree: DataTree) -> tuple[Array, Array, Array, Scale, Scale]:
     """Displacement of the load point, force and predicted forces in units for print."""
     observed = tree["observed_data"].to_dataset()
-    name = next(one for one in FORCES if one in observed)
+    name = force_among(observed)
     predicted = tree["posterior_predictive"].to_dataset()[name].values[0]
     force, moved = observed[name].values, observed["drive_displacement"].values
     unit = scale_for(float(np.max(np.abs(force))), FORCES[name])
@@ -52,7 +45,7 @@ def _parts(tree: xr.DataTree) -> tuple[Array, Array, Array, Scale, Scale]:
     return moved / length.size, force / unit.size, predicted / unit.size, length, unit
 
 
-def draw_record(axes: Axes, tree: xr.DataTree, _: Options) -> None:
+def draw_record(axes: Axes, tree: DataTree, _: Options) -> None:
     """Draw the record over the band of predicted ones, against the load point."""
     moved, force, predicted, length, unit = _parts(tree)
     band = np.percentile(predicted, [5, 95], axis=0)
@@ -64,7 +57,7 @@ def draw_record(axes: Axes, tree: xr.DataTree, _: Options) -> None:
     axes.legend()
 
 
-def _draw_residuals(axes: Axes, tree: xr.DataTree) -> None:
+def _draw_residuals(axes: Axes, tree: DataTree) -> None:
     """Draw the record less the median of predicted ones, over their band."""
     moved, force, predicted, length, unit = _parts(tree)
     middle = np.median(predicted, axis=0)

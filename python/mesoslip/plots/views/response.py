@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
 
 from mesoslip.analysis.experiment_stages import Experiment
 from mesoslip.analysis.rate_and_state import MAX_MISFIT, Fit, fit_laws, records_of
@@ -21,8 +20,6 @@ from mesoslip.plots.response_record import draw_record, fit_label, title_record
 from mesoslip.plots.style import FITTED, POINTS, RED, Canvas, canvas, write_title
 from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import Scale, percent, scale_for, with_error, with_unit
-
-Array = NDArray[np.float64]
 
 # Relative error of a slope below which the motion has no noise, as that of N → ∞.
 NOISELESS = 1e-5

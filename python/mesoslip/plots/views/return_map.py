@@ -2,33 +2,29 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from mesoslip.analysis.return_map import settled_peaks
+from mesoslip.array_types import DataTree
 from mesoslip.plots.style import BLUE, Canvas, canvas, titles
 from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import scale_for
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 # Distance of the peaks from the frame over their range, and maximum number of intervals of an axis.
 MARGIN, TICKS = 0.05, 5
 
 
-def draw(tree: xr.DataTree, options: Options, figure: Canvas | None) -> Canvas:
+def draw(tree: DataTree, options: Options, figure: Canvas | None) -> Canvas:
     """The return map in a square."""
     figure = canvas(figure, (3.6, 3.8))
     draw_panel(figure.subplots(), tree, options)
     return figure
 
 
-def draw_panel(axes: Axes, tree: xr.DataTree, options: Options) -> None:
+def draw_panel(axes: Axes, tree: DataTree, options: Options) -> None:
     """Draw each peak of the second half of a run over the peak before it."""
     draw_map(axes, settled_peaks(tree, options.extent.realization or 0))
     titles(axes, tree)

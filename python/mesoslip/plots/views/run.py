@@ -188,10 +188,6 @@ def _compare(
     draw_curves(axes, curves, names[0], horizontal, quantities)
 
 
-def _has_velocity(tree: Tree) -> bool:
-    return is_measured(tree) or not config_of(tree).slider.jumps
-
-
 VIEW = View(
     name="run",
     kind="run",
@@ -203,5 +199,5 @@ VIEW = View(
     compare_all=compare,
     compare_panel=compare_forces,
     takes_arrays=True,
-    applies=_has_velocity,
+    applies=lambda tree: is_measured(tree) or not config_of(tree).slider.jumps,
 )

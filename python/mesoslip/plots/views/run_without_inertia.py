@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
 
+from mesoslip.array_types import Array, Dataset
 from mesoslip.output.access import config_of, group_of, is_measured
 from mesoslip.output.arrays import Arrays, Tree
 from mesoslip.output.samples import times_of
@@ -18,11 +17,6 @@ from mesoslip.plots.extent import Extent
 from mesoslip.plots.style import RED, Canvas, canvas, titles
 from mesoslip.plots.views import run
 from mesoslip.plots.views.base import EXTENT, Options, View
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-Array = NDArray[np.float64]
 
 # Maximum number of avalanches with a vector mark each; more of them become an image.
 MAX_MARKS = 3000
@@ -73,7 +67,7 @@ def _against_displacement(extent: Extent) -> Extent:
     return replace(extent, against=extent.against or "displacement")
 
 
-def _catalogue(tree: Tree, extent: Extent) -> xr.Dataset | Arrays:
+def _catalogue(tree: Tree, extent: Extent) -> Dataset | Arrays:
     """Avalanches of a realization in a window of time."""
     data = group_of(tree, "avalanches")
     starts = data["start_time"].values
@@ -82,22 +76,16 @@ def _catalogue(tree: Tree, extent: Extent) -> xr.Dataset | Arrays:
     return data.isel(avalanche=np.flatnonzero(inside))
 
 
-def _positions(tree: Tree, data: xr.Dataset | Arrays, extent: Extent) -> Array:
+def _positions(tree: Tree, data: Dataset | Arrays, extent: Extent) -> Array:
     """Avalanches along the horizontal axis, in SI."""
     name, _ = extent.horizontal
     starts: Array = data["start_time"].values
     if name == "time":
         return starts
     if name == "displacement":
-        displacements: Array = data["displacement"].values
-        return displacements
+        return data["displacement"].values
     moved = tree.to_dataset()[name].isel(realization=extent.first).values
-    positions: Array = np.interp(starts, times_of(tree), moved)
-    return positions
-
-
-def _jumps(tree: Tree) -> bool:
-    return not is_measured(tree) and config_of(tree).slider.jumps
+    return np.interp(starts, times_of(tree), moved)
 
 
 VIEW = View(
@@ -110,5 +98,5 @@ VIEW = View(
     compare_all=run.compare,
     compare_panel=run.compare_forces,
     takes_arrays=True,
-    applies=_jumps,
+    applies=lambda tree: not is_measured(tree) and config_of(tree).slider.jumps,
 )

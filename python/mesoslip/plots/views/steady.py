@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from matplotlib.axes import Axes
 
+from mesoslip.array_types import DataTree
 from mesoslip.output.access import config_of
 from mesoslip.plots.style import BLUE, RED, Canvas, canvas, legend_above, titles
 from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import Scale, scale_for, with_unit
 
-if TYPE_CHECKING:
-    import xarray as xr
 
-
-def draw(tree: xr.DataTree, options: Options, figure: Canvas | None) -> Canvas:
+def draw(tree: DataTree, options: Options, figure: Canvas | None) -> Canvas:
     """Force and critical stiffness over velocity, with the configured spring."""
     data = tree.to_dataset()
     critical = data["critical_stiffness"].values
@@ -50,7 +46,7 @@ def draw(tree: xr.DataTree, options: Options, figure: Canvas | None) -> Canvas:
     return figure
 
 
-def draw_force(axes: Axes, tree: xr.DataTree, _: Options) -> None:
+def draw_force(axes: Axes, tree: DataTree, _: Options) -> None:
     """Draw the steady force over velocity, with the velocity of the drive."""
     data, speed = tree.to_dataset(), _speed(tree)
     values = data["steady_force"].values
@@ -74,7 +70,7 @@ def draw_force(axes: Axes, tree: xr.DataTree, _: Options) -> None:
     legend_above(axes)
 
 
-def _speed(tree: xr.DataTree) -> Scale:
+def _speed(tree: DataTree) -> Scale:
     values = tree.to_dataset()["velocity"].values
     return scale_for(float(np.sqrt(values[0] * values[-1])), "m/s")
 

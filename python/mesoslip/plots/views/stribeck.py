@@ -7,6 +7,7 @@ from matplotlib.axes import Axes
 
 from mesoslip.analysis.plateaus import Plateaus, plateaus_of
 from mesoslip.output.arrays import Tree
+from mesoslip.output.variables import force_among
 from mesoslip.plots.printing import is_narrow
 from mesoslip.plots.style import POINTS, RED, Canvas, canvas, legend_above, titles
 from mesoslip.plots.views.base import Options, View
@@ -58,8 +59,7 @@ def draw_curve(axes: Axes, found: Plateaus) -> None:
 def draw_record(axes: Axes, tree: Tree, found: Plateaus) -> None:
     """Draw the force of the first realization, with the mean of each plateau over it."""
     root = tree.to_dataset()
-    force_name = "spring_force" if "spring_force" in root else "friction_coefficient"
-    time, force = root["time"].values, root[force_name].values[0]
+    time, force = root["time"].values, root[force_among(root)].values[0]
     columns = found.columns
     mine = columns["realization_index"] == 0
     sign = -1.0 if np.nanmean(force) < 0 else 1.0

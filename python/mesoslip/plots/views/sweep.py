@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 from matplotlib.lines import Line2D
 
+from mesoslip.array_types import DataArray, Dataset, DataTree
 from mesoslip.errors import FileError
 from mesoslip.plots.boundaries import add_legend, boundary_measures, draw_contours, draw_crossings
 from mesoslip.plots.key_names import name_of, plain, symbol_or_name
@@ -27,9 +28,6 @@ from mesoslip.plots.sweep_panels import (
 from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import number
 
-if TYPE_CHECKING:
-    import xarray as xr
-
 # Measures of an overview, and of one in a column of a journal.
 MAX_PANELS, MAX_NARROW = 6, 3
 # Panels in each row of an overview, by their number, and in a row of maps of one measure.
@@ -41,7 +39,7 @@ PANEL = (3.0, 2.4)
 ALONE = (4.4, 3.6)
 
 
-def draw(tree: xr.DataTree, options: Options, figure: Canvas | None) -> Canvas:
+def draw(tree: DataTree, options: Options, figure: Canvas | None) -> Canvas:
     """A panel for each of the first measures of a sweep; or one measure, with a panel for each
     value of the first of three dimensions."""
     data = tree.to_dataset()
@@ -107,7 +105,7 @@ def _about_means(panels: list[Measured]) -> str:
     return "; ".join([*([means] * has_numbers), *([shares] * has_choices)])
 
 
-def draw_panel(axes: Axes, tree: xr.DataTree, options: Options) -> None:
+def draw_panel(axes: Axes, tree: DataTree, options: Options) -> None:
     """Draw a measure of a sweep, the first one by default.
 
     Over one key it is dots for realizations and a line for their mean; over two a map of the mean,
@@ -119,14 +117,14 @@ def draw_panel(axes: Axes, tree: xr.DataTree, options: Options) -> None:
     add_legend(axes, panel.draw(axes), _about_means([panel.measured]))
 
 
-def measures(data: xr.Dataset) -> list[str]:
+def measures(data: Dataset) -> list[str]:
     """Measures of a sweep that have a picture: not those that are boundaries in another."""
     names = [str(name) for name in data.data_vars if name != "status"]
     lines = boundary_measures(names)
     return [name for name in names if name not in lines]
 
 
-def _known(data: xr.Dataset, name: str) -> str:
+def _known(data: Dataset, name: str) -> str:
     there = [str(one) for one in data.data_vars if one != "status"]
     if name not in there:
         raise FileError(f"the sweep has no measure {name!r}; it has {', '.join(there)}")
@@ -136,7 +134,7 @@ def _known(data: xr.Dataset, name: str) -> str:
 class _Panel(NamedTuple):
     """A measure along the keys that are drawn; other keys have a fixed value, as in its title."""
 
-    data: xr.Dataset
+    data: Dataset
     name: str
     keys: list[SweptKey]
     is_line: bool
@@ -144,7 +142,7 @@ class _Panel(NamedTuple):
     measured: Measured
 
     @classmethod
-    def of(cls, data: xr.Dataset, name: str) -> _Panel:
+    def of(cls, data: Dataset, name: str) -> _Panel:
         data, names, fixed = _shown_keys(data)
         keys = [SweptKey.of(data[one]) for one in names]
         scale = scale_of(data[name])
@@ -173,7 +171,7 @@ class _Panel(NamedTuple):
         return lines
 
 
-def _shown_keys(data: xr.Dataset) -> tuple[xr.Dataset, list[str], list[str]]:
+def _shown_keys(data: Dataset) -> tuple[Dataset, list[str], list[str]]:
     """A sweep at the first values of its third and further dimensions, the keys along the first
     two, and the values of the others in words. If it goes up and down a key, only that is shown."""
     dimensions = _dimensions(data)
@@ -190,7 +188,7 @@ def _shown_keys(data: xr.Dataset) -> tuple[xr.Dataset, list[str], list[str]]:
     return data, keys, fixed
 
 
-def _value(coordinate: xr.DataArray) -> str:
+def _value(coordinate: DataArray) -> str:
     """The first value of a swept key, with the unit that suits all of them."""
     value = coordinate.values[0]
     if coordinate.dtype.kind not in "fiu":
@@ -199,13 +197,13 @@ def _value(coordinate: xr.DataArray) -> str:
     return f"{number(value / scale.size)} {scale.name}".rstrip()
 
 
-def _dimensions(data: xr.Dataset) -> list[str]:
+def _dimensions(data: Dataset) -> list[str]:
     """Dimensions along which keys vary."""
     without = {"realization", DIRECTION}
     return [str(name) for name in data["status"].dims if name not in without]
 
 
-def _parts(data: xr.Dataset) -> Iterator[xr.Dataset]:
+def _parts(data: Dataset) -> Iterator[Dataset]:
     """The sweep at each value of its first dimension, if it has three; or of the other dimension,
     if it has two and goes up and down one."""
     dimensions = _dimensions(data)

@@ -12,13 +12,11 @@ from mesoslip.reports.content import Writer
 from mesoslip.reports.sections.avalanches import avalanches
 from mesoslip.reports.sections.changes import changes
 from mesoslip.reports.sections.configuration import configuration
-from mesoslip.reports.sections.energy import energy
+from mesoslip.reports.sections.energy import energy, regime
 from mesoslip.reports.sections.methods import methods
-from mesoslip.reports.sections.parameters import parameters
+from mesoslip.reports.sections.parameters import parameters, rates
 from mesoslip.reports.sections.pictures import pictures
 from mesoslip.reports.sections.provenance import provenance
-from mesoslip.reports.sections.rates import rates
-from mesoslip.reports.sections.regime import regime
 from mesoslip.reports.sections.response import response
 from mesoslip.reports.sections.slips import slips
 from mesoslip.reports.sections.strokes import strokes

@@ -1,15 +1,29 @@
-"""Energy balances of runs."""
+"""Regimes and energy balances of runs."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 
+from mesoslip.analysis import regime as regimes
 from mesoslip.output import variables
 from mesoslip.output.access import group_of, is_measured
 from mesoslip.quantities import UNKNOWN, number
 from mesoslip.reports.content import Block, Section, Subject, Table, Text
 from mesoslip.reports.sections.base import columns_in_one_unit, named
+
+
+def regime(subjects: Sequence[Subject]) -> Section:
+    """The regime of the motion of each run."""
+    blocks = []
+    for subject in subjects:
+        results, motion = regimes.judge(subject.tree, subject.name)
+        text = (
+            regimes.summary(results) if motion is None else f"in the last stage the slider {motion}"
+        )
+        blocks.append(Text(named(subjects, subject, f"{text[:1].upper()}{text[1:]}.")))
+    return Section("Regime", tuple(blocks))
+
 
 DIGITS = 5
 

@@ -1,4 +1,4 @@
-"""Parameters of fits, with their uncertainties."""
+"""Posteriors: parameters of fits, and of rates and states, with their uncertainties."""
 
 from __future__ import annotations
 
@@ -12,14 +12,8 @@ from mesoslip.reports.sections.base import picture_of
 if TYPE_CHECKING:
     from mesoslip.inference.posterior import Row
 
-HEAD = (
-    "parameter",
-    "median",
-    "50 % interval",
-    "90 % interval",
-    "verdict",
-    "follows from",
-)
+
+HEAD = ("parameter", "median", "50 % interval", "90 % interval", "verdict", "follows from")
 
 
 def parameters(subjects: Sequence[Subject]) -> Section:
@@ -53,3 +47,22 @@ def _row(parameter: Row) -> tuple[str, ...]:
     intervals = (f"{lower} to {upper}", f"{low} to {high}")
     key = shown.head(parameter.key)
     return (key, median, *intervals, parameter.verdict, parameter.follows_from)
+
+
+def rates(subjects: Sequence[Subject]) -> Section:
+    """Parameters of rate-and-state laws with their intervals, and whether each law describes the
+    record."""
+    from mesoslip.inference.rate_tree import rate_table, remarks
+
+    blocks: list[Block] = []
+    for subject in subjects:
+        if len(subjects) > 1:
+            blocks.append(Text(subject.name))
+        table, found = rate_table(subject.tree), remarks(subject.tree)
+        blocks.append(Table(table.head, table.rows))
+        texts = (*found["assessments"], *found["notes"])
+        blocks += [Text(f"{one[0].upper()}{one[1:]}.") for one in texts]
+        blocks += [Text(f"Warning: {one}.", warns=True) for one in found["warnings"]]
+        caption = "Parameters of the first law, and the record with predicted ones"
+        blocks.append(picture_of(subjects, subject, caption))
+    return Section("Rates and states", tuple(blocks))

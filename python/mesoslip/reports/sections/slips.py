@@ -8,13 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from mesoslip.analysis.slips import (
-    Catalogue,
-    as_recorded,
-    catalogue_of,
-    counts,
-    printed_counts,
-)
+from mesoslip.analysis.slips import Catalogue, as_recorded, catalogue_of, counts, printed_counts
 from mesoslip.output.access import group_of
 from mesoslip.plots.lines import max_size
 from mesoslip.plots.style import curve_color

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mesoslip.array_types import DataArray
 from mesoslip.configuration import differences
 from mesoslip.configuration.units import from_cf_units
 from mesoslip.plots.views.sweep import measures
 from mesoslip.reports.content import Block, Section, Source, Subject, Table, Text
 from mesoslip.reports.sections.base import named, picture_of, row_in_one_unit
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 # Maximum number of measures with a picture.
 MAX_MAPS = 12
@@ -46,7 +44,7 @@ def sweep(subjects: Sequence[Subject]) -> Section:
     return Section("Sweep", tuple(blocks))
 
 
-def _range(data: xr.DataArray) -> tuple[str, ...]:
+def _range(data: DataArray) -> tuple[str, ...]:
     """The range of a measure; of a choice, how often each value occurred."""
     values = data.values.astype(float)
     values = values[np.isfinite(values)]

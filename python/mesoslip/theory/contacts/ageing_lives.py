@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mesoslip.array_types import Array
 from mesoslip.theory.contacts.steady import check_steady
 from mesoslip.theory.delays import drag_impulse, mean_delay
 from mesoslip.theory.thresholds import threshold_quadrature
@@ -14,7 +14,6 @@ from mesoslip.theory.thresholds import threshold_quadrature
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
 
-Array = NDArray[np.float64]
 
 # Panels and points of the quadrature over the configured thresholds.
 PANELS, POINTS = 80, 12

@@ -10,18 +10,16 @@ from __future__ import annotations
 
 import math
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mesoslip.array_types import Array, Complex
 from mesoslip.theory.contacts.ageing_lives import lives, steady_force
 from mesoslip.theory.frequency_paths import AVERAGED_OUT, Parts, Turns
 from mesoslip.theory.linear_stability import LinearStability
 from mesoslip.theory.thresholds import threshold_quadrature
-
-Array = NDArray[np.float64]
-Complex = NDArray[np.complexfloating[Any, Any]]
 
 # Relative change of an age, and change of ln v, for derivatives.
 AGE_STEP, SLOPE_STEP = 1e-6, 1e-3
@@ -120,8 +118,7 @@ class AgeingSliding(LinearStability):
         weight, age = (one.reshape(-1, POINTS) for one in self._ends[:2])
         likely = weight.sum(axis=1) > UNLIKELY
         longest = float(np.max(np.ptp(age[likely], axis=1)))
-        dephased: NDArray[np.bool_] = np.abs(rate) * longest > MAX_TURN
-        return dephased
+        return np.abs(rate) * longest > MAX_TURN
 
     @property
     def _turns(self) -> Turns:

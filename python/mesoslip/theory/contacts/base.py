@@ -6,13 +6,12 @@ import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, ClassVar, NoReturn
 
+from mesoslip.array_types import DataTree
 from mesoslip.errors import ConfigError, Problem
 from mesoslip.quantities import with_unit
 from mesoslip.theory.quantity import Quantity
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from mesoslip.configuration.config import Config
     from mesoslip.theory.linear_stability import LinearStability
 
@@ -74,7 +73,7 @@ class ContactTheory:
         """Refuse contacts whose detachment along a row of blocks has no steady fronts."""
         self._refuse("no theory of steady fronts")
 
-    def curve_groups(self) -> dict[str, xr.DataTree]:
+    def curve_groups(self) -> dict[str, DataTree]:
         """Groups of the output of ``mesoslip curve`` beyond those of all kinds, by name."""
         return {}
 

@@ -14,11 +14,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from functools import cached_property
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mesoslip.array_types import Complex
 from mesoslip.configuration import arguments
 from mesoslip.configuration.config import Config
 from mesoslip.errors import Problem
@@ -27,9 +26,6 @@ from mesoslip.theory.frequency_paths import Parts, Turns
 from mesoslip.theory.life_transforms import LifeTransforms, Lives
 from mesoslip.theory.linear_stability import DEPHASED_WIDTH, LinearStability
 from mesoslip.theory.lives import newborn_stretch
-
-Array = NDArray[np.float64]
-Complex = NDArray[np.complexfloating[Any, Any]]
 
 OTHER_THEORY = "has a response of its own, that of mesoslip.theory.steady_sliding.sliding_of"
 

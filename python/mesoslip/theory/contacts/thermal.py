@@ -12,8 +12,9 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mesoslip.array_types import Array
 from mesoslip.configuration.contacts.thermal import thermal_of
 from mesoslip.errors import ConfigError, Problem
 from mesoslip.theory.contacts.base import ContactTheory
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
     from mesoslip.theory.contacts.thermal_holds import Restart
     from mesoslip.theory.contacts.thermal_sliding import ThermalSliding
 
-Array = NDArray[np.float64]
 
 # Velocities between which creep is sought, over that of activation, ω_0 f_T/k, and their number.
 MIN_CREEP, MAX_CREEP, CREEP_POINTS = 1e-30, 1e6, 80

@@ -9,13 +9,12 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mesoslip.array_types import Array
 from mesoslip.errors import MesoslipError
 from mesoslip.theory.contacts.thermal_lives import ThermalLives
 from mesoslip.theory.delays import delay_law
-
-Array = NDArray[np.float64]
 
 # Probability that a contact which attaches in a hold breaks in it, beyond which its force there
 # is refused.
@@ -52,15 +51,7 @@ def hold_force(lives: ThermalLives, time: ArrayLike) -> Array:
 
 
 class Restart(NamedTuple):
-    """Force after a hold, under a prescribed slider.
-
-    Attributes
-    ----------
-    displacement
-        Displacements since the end of the hold [m].
-    force
-        The force there [N].
-    """
+    """Force [N] over the displacement since the end of a hold [m], under a prescribed slider."""
 
     displacement: Array
     force: Array

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mesoslip.array_types import Array
 from mesoslip.configuration.contacts.ageing import ageing_of
 from mesoslip.configuration.contacts.thermal import thermal_of
 from mesoslip.theory.contacts.ageing_lives import lives as breaking_ages
@@ -29,7 +30,6 @@ from mesoslip.theory.thresholds import threshold_quadrature
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
 
-Array = NDArray[np.float64]
 # Real or complex.
 Complex = NDArray[np.inexact[Any]]
 

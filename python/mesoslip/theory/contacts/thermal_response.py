@@ -9,15 +9,13 @@ from __future__ import annotations
 
 import itertools
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mesoslip.array_types import Array, Complex
 from mesoslip.theory.contacts.thermal_lives import AGEING_PANELS, POINTS, ThermalLives, cumulative
-
-Array = NDArray[np.float64]
-Complex = NDArray[np.complexfloating[Any, Any]]
 
 # Product of a rate and the length of a panel up to which its quadrature has rounding errors only.
 MAX_TURN = 6.0

@@ -12,20 +12,17 @@ from __future__ import annotations
 
 import math
 from functools import cached_property
-from typing import Any, ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mesoslip.array_types import Array, Complex
 from mesoslip.theory.contacts.thermal_lives import ThermalAgeingLives, ThermalLives
 from mesoslip.theory.contacts.thermal_response import MAX_TURN, Motion, ThermalResponse
 from mesoslip.theory.delays import drag_impulse
 from mesoslip.theory.frequency_paths import AVERAGED_OUT, Parts, Turns
 from mesoslip.theory.linear_stability import LinearStability
 from mesoslip.theory.sliders import mode_frequencies
-
-Array = NDArray[np.float64]
-Complex = NDArray[np.complexfloating[Any, Any]]
 
 # Length of the panels over thresholds and ages, over f_T and f_T/(k v), for about six digits.
 COARSENESS = 4.0
@@ -52,17 +49,11 @@ POINTS_A_MODE = 2
 class RateAndStateTheory(NamedTuple):
     """Parameters of rate and state that describe contacts near a velocity.
 
-    Attributes
-    ----------
-    a
-        Direct effect [N]: N f_T times the shares of contacts that are pinned, and of those that
-        break before they reach their thresholds, and the drag of the detached ones. After a step of
-        the velocity by a factor r contacts break at a force that is higher by f_T ln r.
-    b
-        Evolution effect [N]: a - dF/d ln v.
-    slip_distance
-        D_c [m]: displacement over which the force evolves, the area between the evolving force and
-        its new steady value over the evolution of the force, for a small step.
+    The direct effect a [N] is N f_T times the shares of contacts that are pinned, and of those that
+    break before they reach their thresholds, and the drag of the detached ones: after a step of the
+    velocity by a factor r contacts break at a force that is higher by f_T ln r. The evolution
+    effect b [N] is a - dF/d ln v. The slip distance D_c [m] is the area between the evolving force
+    and its new steady value over the evolution of the force, for a small step.
     """
 
     a: float
@@ -175,8 +166,7 @@ class ThermalSliding(LinearStability):
         modes = np.array(mode_frequencies(self.config.slider))
         places = np.arange(0, len(modes), 1 / POINTS_A_MODE)
         between = np.interp(places, np.arange(len(modes)), modes) if modes.size else modes
-        resolved: Array = np.union1d(path, between[between < last])
-        return resolved
+        return np.union1d(path, between[between < last])
 
     @property
     def is_passive(self) -> bool:

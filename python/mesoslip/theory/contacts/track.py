@@ -6,14 +6,13 @@ import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, ClassVar
 
+from mesoslip.array_types import DataTree
 from mesoslip.errors import ConfigError
 from mesoslip.theory.contacts.base import ContactTheory
 from mesoslip.theory.contacts.plain import PlainTheory
 from mesoslip.theory.quantity import Quantity
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from mesoslip.theory.linear_stability import LinearStability
 
 
@@ -29,7 +28,7 @@ class TrackTheory(PlainTheory):
     def check_steady_front(self) -> None:
         ContactTheory.check_steady_front(self)
 
-    def curve_groups(self) -> dict[str, xr.DataTree]:
+    def curve_groups(self) -> dict[str, DataTree]:
         import xarray as xr
 
         from mesoslip.theory.track_response import TrackResponse, track_dataset

@@ -6,9 +6,10 @@ import math
 from typing import Annotated, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from pydantic import Field, StrictBool, model_validator
 
+from mesoslip.array_types import Array
 from mesoslip.configuration.contacts.tables.ageing import Ageing
 from mesoslip.configuration.contacts.tables.thermal import Thermal
 from mesoslip.configuration.contacts.tables.threshold import Threshold
@@ -30,8 +31,6 @@ from mesoslip.configuration.table import (
 )
 from mesoslip.errors import ConfigError, Problem
 from mesoslip.quantities import with_unit
-
-Array = NDArray[np.float64]
 
 # Choices, by the names that the kernels use.
 COUPLINGS = ("scaled", "equal", "table")

@@ -6,9 +6,9 @@ import math
 from typing import Annotated, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from mesoslip.array_types import Array
 from mesoslip.configuration.contacts.tables.contacts import Contacts
 from mesoslip.configuration.table import (
     Complaint,
@@ -19,8 +19,6 @@ from mesoslip.configuration.table import (
     choice,
     problem,
 )
-
-Array = NDArray[np.float64]
 
 # Lattices, and the neighbours of a contact on each.
 NEIGHBOURS = {"triangular": 6, "square": 4}

@@ -195,7 +195,7 @@ def test_a_stream_that_takes_nothing():
     )
 
 
-@pytest.mark.parametrize("closed", [*map(long, ["0<&-", "2>&-"]), "1>&-", "0<&- 1>&- 2>&-"])
+@pytest.mark.parametrize("closed", [*map(long, ["0<&-", "1>&-", "2>&-"]), "0<&- 1>&- 2>&-"])
 def test_closed_streams(closed, short, tmp_path):
     output = tmp_path / "out.nc"
     line = f"{sys.executable} -m mesoslip run {short} -o {output} {closed}"

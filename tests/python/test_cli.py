@@ -531,8 +531,7 @@ def test_messages_do_not_steer_the_terminal(capsys):
     ("module", "content"),
     [
         ("plots.style", b"\xff\xfe: \x80\n"),
-        ("reports.content", b"text.usetex: True\n"),
-        long("plots.style", b"text.usetex: True\n"),
+        *(long(one, b"text.usetex: True\n") for one in ("plots.style", "reports.content")),
         long("reports.content", b"\xff\xfe: \x80\n"),
     ],
 )

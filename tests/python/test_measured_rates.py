@@ -10,6 +10,7 @@ from functools import partial
 import numpy as np
 import pytest
 import xarray as xr
+from conftest import long
 from mesoslip.analysis import response as responses
 from mesoslip.analysis.experiment_stages import Experiment
 from mesoslip.analysis.rate_and_state import (
@@ -78,8 +79,13 @@ def check(row, law=LAW):
         assert row[f"{name}_error"] < 0.25 * value
 
 
-@pytest.mark.parametrize("evolution", ["ageing", "slip"])
-@pytest.mark.parametrize("slip_distance", [1 * UM, 60 * UM])
+@pytest.mark.parametrize(
+    ("evolution", "slip_distance"),
+    [
+        *(("ageing", 1 * UM), ("slip", 60 * UM)),
+        *(long("slip", 1 * UM), long("ageing", 60 * UM)),
+    ],
+)
 def test_a_step_is_found_over_decades(evolution, slip_distance):
     """With its law, which the record prefers."""
     law = Friction(0.6, 3 * UM, 0.01, 0.009, slip_distance, evolution)

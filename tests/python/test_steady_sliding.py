@@ -9,7 +9,7 @@ import sys
 import mesoslip
 import numpy as np
 import pytest
-from conftest import ROOT
+from conftest import ROOT, long
 from mesoslip import ConfigError, SteadySliding
 from mesoslip.analysis.regime import STICK_SLIP
 from mesoslip.quantities import with_unit
@@ -118,7 +118,7 @@ def test_without_delay_steady_contacts_do_not_answer(klein):
     assert np.min(np.abs(roots - slider[slider.imag > 0][0])) < 1e-6
 
 
-@pytest.mark.parametrize("velocity", [3e-7, 3e-6])
+@pytest.mark.parametrize("velocity", [3e-7, long(3e-6)])
 def test_roots_are_as_many_as_the_argument_tells(klein, velocity):
     """All unstable roots by Newton's method from a fine grid of starts, one by one."""
     config = klein(contacts__threshold__relative_width=0.05, drive__velocity=velocity)

@@ -445,7 +445,7 @@ def test_without_temperature_it_is_the_model_without(kind, rate, force_ratio):
 @pytest.mark.parametrize(
     "changes",
     [
-        {"run__duration": 0.02, "drive__velocity": 1e-5},
+        long({"run__duration": 0.02, "drive__velocity": 1e-5}),
         {
             "run__duration": None,
             "drive": {

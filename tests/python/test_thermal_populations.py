@@ -51,7 +51,7 @@ def extrapolated_force(velocity: float, distance: float, **changes: Any) -> floa
     return (4 * fine - coarse) / 3 / COUNT
 
 
-@pytest.mark.parametrize(("velocity", "force"), [(1e-4, 0.3721068), (1e-2, 0.4634253)])
+@pytest.mark.parametrize(("velocity", "force"), [long(1e-4, 0.3721068), (1e-2, 0.4634253)])
 def test_steady_force_is_the_closed_form_to_six_digits(velocity, force):
     assert extrapolated_force(velocity, 90.0) == pytest.approx(force, abs=1e-6)
 

@@ -74,7 +74,7 @@ def test_fixed_step_converges_to_events(klein, coupling):
     # Up to the end of the first slip; later, the order of breaks at a coarse step may differ.
     times = tree["time"].values
     errors = []
-    steps = np.array([4e-6, 2e-6, 1e-6, 5e-7])
+    steps = np.array([4e-6, 2e-6, 1e-6])
     for step in steps:
         trace, contacts = fixed_step(config, step)
         before = times < 0.022
@@ -88,7 +88,7 @@ def test_fixed_step_converges_to_events(klein, coupling):
         ]
         assert same_order
         assert np.max(np.abs(delays[:count])) < 20 * step
-    assert errors[-1] < 1e-4 * config.contacts.static_force
+    assert errors[-1] < 2e-4 * config.contacts.static_force
     slope = np.polyfit(np.log(steps), np.log(errors), 1)[0]
     assert 0.7 < slope < 1.6
 

@@ -39,7 +39,7 @@ STEP = [Loading(60, 3 * UM, 3 * UM), Loading(60, 10 * UM, 10 * UM)]
 STIFFNESS = 1e-3 / UM
 
 
-def trace(law=LAW, stages=STEP, noise=3e-4, rate=10.0, *, trend=0.0, known=True, seed=0):
+def trace(law=LAW, stages=STEP, noise=3e-4, rate=5.0, *, trend=0.0, known=True, seed=0):
     """A measured trace of friction coefficients."""
     duration = sum(one.duration for one in stages)
     # Two sampling rates in one file.
@@ -152,7 +152,7 @@ def test_numbers_beyond_the_friction_are_refused():
 
 def test_a_stage_of_one_interval_holds_no_step():
     """A false stage in the load point: the record ends before it."""
-    experiment = Experiment(trace())
+    experiment = Experiment(trace(rate=10.0))
     first, second = experiment.stages
     experiment.stages = (
         first,

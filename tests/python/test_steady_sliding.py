@@ -221,7 +221,7 @@ def test_boundary_is_where_growth_begins(klein):
 
 
 def test_stiffer_springs_than_one_make_sliding_stable(klein, tmp_path, command):
-    config = klein()
+    config = klein(curve={"length": 3 * klein().contacts.break_stretch})
     found, most = stable_stiffness(config), stable_stiffness(config, dephased=True)
     # K* is far above, and the spring of the experiment below.
     assert 97 < most < found < ForceCurve(config).K_star[0] / 10
@@ -261,7 +261,7 @@ def test_what_has_no_steady_sliding_is_refused(klein):
 
 def test_info_and_curve_report_steady_sliding(klein, tmp_path, command):
     file = tmp_path / "klein.toml"
-    file.write_text(klein().to_toml())
+    file.write_text(klein(curve={"length": 3 * klein().contacts.break_stretch}).to_toml())
     soft = ("--set", "slider.stiffness=200", "--set", "contacts.delay=3e-4")
     for name in ("info", "curve"):
         status, printed, _ = command(name, file, *soft)

@@ -35,7 +35,7 @@ def test_steady_force_of_ageing_contacts_is_that_of_a_plain_quadrature(ageing):
     )
 
 
-@pytest.mark.parametrize("law", ["gaussian", "uniform", long("weibull")])
+@pytest.mark.parametrize("law", ["uniform", *map(long, ["gaussian", "weibull"])])
 def test_creep_is_the_inverse_of_the_steady_force(law):
     config = unit(1, contacts__threshold={"law": law, "relative_width": 0.2})
     for velocity in (1e-6, 1e-2):
@@ -52,7 +52,7 @@ def test_damping_of_a_slider_under_a_force_slows_its_creep():
     assert contact_theory(config).creep_velocity(force) == pytest.approx(velocity, rel=1e-8)
 
 
-@pytest.mark.parametrize("delay", [0.0, 4.0])
+@pytest.mark.parametrize("delay", [long(0.0), 4.0])
 def test_hold_and_restart_are_those_of_contacts_one_by_one(delay):
     """N contacts slide, stand still and go on; within the noise of N."""
     count, velocity, hold = 20_000, 1e-2, 300.0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import itertools
 import math
 
 import mesoslip
@@ -57,9 +58,17 @@ def may_age(kind):
     )
 
 
+def kinds_and_laws():
+    """Each kind with either law, by turns; make fuzz has both."""
+    kinds = pairwise(filter(may_age, KINDS))
+    short = [kind for kind in kinds if isinstance(kind, str)]
+    turns = set(zip(short, itertools.cycle(["relax", "log"])))
+    every = itertools.product(filter(may_age, KINDS), ["relax", "log"])
+    return [pair if pair in turns else long(*pair) for pair in every]
+
+
 @pytest.mark.usefixtures("no_step_errors")
-@pytest.mark.parametrize("law", ["relax", "log"])
-@pytest.mark.parametrize("kind", pairwise(filter(may_age, KINDS)))
+@pytest.mark.parametrize(("kind", "law"), kinds_and_laws())
 def test_young_like_old_is_without_ageing_to_the_bit(kind, law):
     same = {"law": "relax", "time": 1e-3, "young_force_ratio": 1.0, "young_relative_width": 0.1}
     if law == "log":
@@ -132,7 +141,7 @@ def test_prescribed_with_reversals_converges_to_events(klein, law):
     assert errors[0] / errors[1] > 2.5
 
 
-@pytest.mark.parametrize("law", ["relax", "weaken", long("log")])
+@pytest.mark.parametrize("law", ["weaken", *map(long, ["relax", "log"])])
 def test_rigid_with_reversals_converges_to_events(klein, law):
     config = klein(
         **staged(10.0),
@@ -147,7 +156,7 @@ def test_rigid_with_reversals_converges_to_events(klein, law):
     # Among them are breaks both ways and in the hold; what follows is sensitive to rounding.
     first = 40
     late = []
-    for step in (4e-6, 1e-6):
+    for step in (8e-6, 2e-6):
         _, contacts = fixed_step(config, step)
         assert [one for _, one in contacts.events[:first]] == [one for _, one in events[:first]]
         pairs = zip(contacts.events[:first], events[:first], strict=True)
@@ -319,15 +328,19 @@ def test_steady_force_of_many_contacts(klein, law, width, velocity):
 
 
 @pytest.mark.parametrize(
-    ("law", "width", "resolution", "bound"),
-    [("gaussian", 0.1, 0.1, 4e-6), ("uniform", 0.2, 0.1, 3e-5), ("weibull", 0.15, 0.1, 1e-5)],
+    ("law", "width", "bound", "velocity"),
+    [
+        (*law, velocity) if (law[0] == "uniform") == (velocity == 1e-4) else long(*law, velocity)
+        for law in (("gaussian", 0.1, 4e-6), ("uniform", 0.2, 3e-5), ("weibull", 0.15, 1e-5))
+        for velocity in (1e-8, 1e-4)
+    ]
+    + [long("gaussian", 0.1, 4e-6, velocity) for velocity in (1e-7, 1e-6, 1e-5)],
 )
-@pytest.mark.parametrize("velocity", [1e-8, long(1e-7), long(1e-6), long(1e-5), 1e-4])
-def test_steady_force_of_the_master_equation(klein, law, width, resolution, bound, velocity):
+def test_steady_force_of_the_master_equation(klein, law, width, bound, velocity):
     """To five digits; the error falls with the square of the resolution."""
     period = STRETCH / velocity
     config = klein(
-        **steady(law, width, velocity, run__engine="me", run__resolution=resolution),
+        **steady(law, width, velocity, run__engine="me", run__resolution=0.1),
         run__duration=25 * period,
         output__interval=0.003 * period,
     )
@@ -362,7 +375,7 @@ def test_steady_force_of_info_is_that_of_the_integral(klein, law):
     )
 
 
-@pytest.mark.parametrize("slider", ["prescribed", "rigid"])
+@pytest.mark.parametrize("slider", ["prescribed", long("rigid")])
 def test_many_contacts_come_to_the_master_equation(klein, slider):
     """A velocity step, a hold and a restart: the difference falls as N^(-1/2)."""
     changes = staged(5.0) | {
@@ -545,7 +558,7 @@ def test_visits_of_contacts_are_work(klein):
     has fewer advances: 2500 if visits were no work."""
     config = klein(
         run__duration=0.1,
-        contacts__count=20_000,
+        contacts__count=5000,
         contacts__coupling="equal",
         contacts__threshold__relative_width=0.1,
         contacts__ageing=RELAX | {"time": 1.0, "young_force_ratio": 0.9},
@@ -556,7 +569,7 @@ def test_visits_of_contacts_are_work(klein):
         realization.advance_to(0.02)
         before = realization.advances
         realization.advance(work=5000.0)
-        assert 1 <= realization.advances - before < 500
+        assert 1 <= realization.advances - before < 1000
 
 
 def test_few_contacts_are_visited_before_any_breaks(klein):

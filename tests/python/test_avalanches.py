@@ -9,7 +9,7 @@ import math
 import mesoslip
 import numpy as np
 import pytest
-from conftest import klein_tables
+from conftest import klein_tables, long
 from kinds import FAST, PLACES, THERMAL
 from mesoslip import Config
 from mesoslip.analysis.avalanche_sizes import EXPONENTIAL_CUTOFF, fit_power_law
@@ -64,7 +64,7 @@ def binned_p_value(sizes: np.ndarray, log_probability, largest: int) -> float:
 
 
 @pytest.mark.usefixtures("few_replicas")
-@pytest.mark.parametrize(("ratio", "largest"), [(1.0, 30), (0.1, 1000), (0.02, 10_000)])
+@pytest.mark.parametrize(("ratio", "largest"), [(1.0, 30), (0.1, 1000), long(0.02, 10_000)])
 def test_sizes_in_stationary_sliding_are_those_of_a_branching_process(ratio, largest):
     """Exactly so for memoryless thresholds: a break of life l moves the slider by l/(1 + K/Nk)/N,
     in which a Poisson number of contacts break; lives being exponential, their number is geometric

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import re
 import runpy
-import subprocess
 import sys
 from pathlib import Path
 
@@ -255,16 +254,11 @@ def test_the_script_judges(outputs, tmp_path, script):
     assert "C4, verdict: Holds with a qualification" in err
 
 
-def test_the_script_draws(outputs, tmp_path):
-    """In a process of its own, as make has it."""
-    done = subprocess.run(
-        [sys.executable, SOURCE / "draw.py", "S18", "--from", outputs, "-o", tmp_path / "figures"],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert (done.returncode, done.stderr) == (0, "")
-    assert (tmp_path / "figures" / "S18.png").stat().st_size > 10000
+@pytest.mark.usefixtures("quick_pictures")
+def test_the_script_draws(outputs, tmp_path, script):
+    status, _, err = script("draw.py", "S18", "--from", outputs, "-o", tmp_path / "figures")
+    assert (status, err) == (0, "")
+    assert (tmp_path / "figures" / "S18.png").stat().st_size > 1000
 
 
 @pytest.mark.parametrize(

@@ -402,7 +402,7 @@ def test_units_mean_what_they_mean_to_pint():
             assert ours == pytest.approx(theirs.magnitude, rel=1e-14, abs=0)
 
 
-@settings(deadline=None)
+@settings(deadline=None, max_examples=50)
 @given(st.text(st.sampled_from("abdehimnostuNPµ%_°"), min_size=1, max_size=6))
 def test_no_name_of_a_unit_breaks_the_library(name):
     with contextlib.suppress(ValueError):
@@ -775,7 +775,7 @@ def test_quantities_are_of_a_size_that_means_something(key, unit, value):
 
 
 @given(st.lists(st.sampled_from(BOUNDED), unique=True), st.data())
-@settings(deadline=None)
+@settings(deadline=None, max_examples=50)
 def test_nothing_overflows_within_the_bounds(keys, data):
     """Klein's case with keys anywhere in their ranges is refused, or has finite quantities."""
     exponents = {key: data.draw(st.integers(-28, 25)) for key, _ in keys}
@@ -816,7 +816,7 @@ ANYTHING = st.recursive(
 
 
 @given(st.sampled_from(sorted(all_keys(Config))), ANYTHING, st.sampled_from([{}, LAYERED]))
-@settings(deadline=None, max_examples=300)
+@settings(deadline=None, max_examples=100)
 def test_nothing_breaks_the_checks(key, value, slider):
     """Anything at any key is taken, or refused in words."""
     changes = {"slider": slider} if slider else {}

@@ -31,6 +31,8 @@ REGULAR = (
     "drive.velocity=3um/s",
     "output.slip_interval=0",
 )
+# Steps twice as long as by default, where numbers are compared more coarsely.
+LONG_STEPS = "run.resolution=0.5"
 
 # Narrow thresholds, slow drive, no back force, and a delay in which the slider comes to rest:
 # nearly all contacts break together and attach together, at one displacement.
@@ -39,6 +41,7 @@ TOGETHER = (
     "contacts.back_force_ratio=0",
     "contacts.delay=0.3 s",
     "contacts.threshold.relative_width=0.05",
+    LONG_STEPS,
     "slider.damping_ratio=0.5",
     "drive.velocity=0.1um/s",
 )
@@ -163,12 +166,12 @@ def test_the_spread_of_an_irregular_motion_has_its_periods():
 
 
 def test_smooth_sliding_and_irregular_motion_are_told_apart():
-    smooth = mesoslip.cycle(configuration("contacts.delay=0"))
+    smooth = mesoslip.cycle(configuration("contacts.delay=0", LONG_STEPS))
     assert smooth.motion == "smooth"
     assert smooth.smooth_stable
     assert smooth.amplitude == 0
     assert "smooth sliding" in smooth.verdict
-    irregular = mesoslip.cycle(configuration("slider.damping_ratio=0.2"), max_cycles=14)
+    irregular = mesoslip.cycle(configuration("slider.damping_ratio=0.2", LONG_STEPS), max_cycles=14)
     assert irregular.motion == "irregular"
     assert irregular.spread > 0.02
     assert sum(irregular.durations) < irregular.followed
@@ -324,7 +327,7 @@ def test_another_slider_keeps_velocities_and_forces(regular, change, damping):
 @pytest.mark.usefixtures("quick_pictures")
 def test_command(command, tmp_path):
     file = tmp_path / "regular.toml"
-    file.write_text(configuration().to_toml())
+    file.write_text(configuration(LONG_STEPS).to_toml())
     output = tmp_path / "cycle.nc"
     status, printed, _ = command("cycle", file, "-o", output)
     assert status == 0
@@ -398,6 +401,7 @@ WEAKLY_DAMPED = (
     "contacts.delay=0.8 ms",
     "contacts.threshold.relative_width=0.2",
     "contacts.initial=steady",
+    LONG_STEPS,
     "drive.velocity=0.8 um/s",
 )
 

@@ -180,13 +180,21 @@ def make_shorter(path):
     path.write_text(text)
 
 
-@pytest.fixture
-def workshop(tmp_path, monkeypatch):
-    """A folder as a reader has it: a clone's runs, an example, an output of it, a table."""
-    shutil.copytree(ROOT / "runs", tmp_path / "runs")
-    shutil.copy(ROOT / "runs" / "klein.toml", tmp_path)
-    for path in tmp_path.rglob("*.toml"):
+@pytest.fixture(scope="module")
+def shortened(tmp_path_factory):
+    """A clone's runs, made short."""
+    folder = tmp_path_factory.mktemp("pages") / "runs"
+    shutil.copytree(ROOT / "runs", folder, ignore=shutil.ignore_patterns("*.py", "__pycache__"))
+    for path in folder.rglob("*.toml"):
         make_shorter(path)
+    return folder
+
+
+@pytest.fixture
+def workshop(shortened, tmp_path, monkeypatch):
+    """A folder as a reader has it: a clone's runs, an example, an output of it, a table."""
+    shutil.copytree(shortened, tmp_path / "runs")
+    shutil.copy(shortened / "klein.toml", tmp_path)
     for name in ("paper-k1002-v42", "basalt-step"):
         for path in (ROOT / "runs" / "measured").glob(f"{name}.*"):
             shutil.copy(path, tmp_path)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import mesoslip
 import numpy as np
 import pytest
+from conftest import long
 from mesoslip.simulation.realization import Realization
 from oracles import exact_events, fixed_step
 
@@ -37,7 +38,6 @@ def breaks(config) -> list[tuple[float, int]]:
 @pytest.mark.parametrize(
     "changes",
     [
-        {"contacts__count": 1},
         {"contacts__count": 1, "contacts__coupling": "equal", "slider__damping_ratio": 0.0},
         {"contacts__count": 1, "contacts__reattach": False, "contacts__drag_rate": 2e16},
         {"contacts__count": 3, "contacts__delay": 0.0},
@@ -48,7 +48,7 @@ def breaks(config) -> list[tuple[float, int]]:
         {"contacts__count": 5, "contacts__renewal": "keep", "contacts__track": TRACK},
     ],
     ids=[
-        *("one", "one undamped", "one bundle", "no delay", "strong drag", "backward", "track"),
+        *("one undamped", "one bundle", "no delay", "strong drag", "backward", "track"),
         *("keep", "keep, track"),
     ],
 )
@@ -65,7 +65,7 @@ def test_events_are_those_of_matrix_exponentials(klein, changes):
     )
 
 
-@pytest.mark.parametrize("coupling", ["scaled", "equal"])
+@pytest.mark.parametrize("coupling", ["scaled", long("equal")])
 def test_fixed_step_converges_to_events(klein, coupling):
     config = klein(**FAST, contacts__coupling=coupling)
     events = breaks(config)
@@ -74,7 +74,7 @@ def test_fixed_step_converges_to_events(klein, coupling):
     # Up to the end of the first slip; later, the order of breaks at a coarse step may differ.
     times = tree["time"].values
     errors = []
-    steps = np.array([4e-6, 2e-6, 1e-6, 5e-7])
+    steps = np.array([4e-6, 2e-6, 1e-6])
     for step in steps:
         trace, contacts = fixed_step(config, step)
         before = times < 0.022
@@ -88,7 +88,7 @@ def test_fixed_step_converges_to_events(klein, coupling):
         ]
         assert same_order
         assert np.max(np.abs(delays[:count])) < 20 * step
-    assert errors[-1] < 1e-4 * config.contacts.static_force
+    assert errors[-1] < 2e-4 * config.contacts.static_force
     slope = np.polyfit(np.log(steps), np.log(errors), 1)[0]
     assert 0.7 < slope < 1.6
 

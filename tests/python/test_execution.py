@@ -42,9 +42,8 @@ def results(executor, function, pieces, **options):
 @pytest.mark.parametrize("executor", EXECUTORS, ids=repr)
 def test_every_piece_comes_back_once(executor):
     pieces = [(number, 7) for number in range(50)]
-    found = results(executor, divmod_of, pieces)
-    assert sorted(found) == [(piece, divmod(*piece)) for piece in pieces]
-    assert results(executor, divmod_of, pieces, in_order=True) == sorted(found)
+    found = results(executor, divmod_of, pieces, in_order=True)
+    assert found == [(piece, divmod(*piece)) for piece in pieces]
     assert results(executor, divmod_of, []) == []
 
 
@@ -435,7 +434,7 @@ def test_whole_numbers_of_a_range_are_exact():
 MANY = SIMPLE.replace("realizations = 2", "realizations = 1000000").replace(', "0.5 ms"', "")
 
 
-@pytest.mark.parametrize("seconds", [1.5, long(8.0)])
+@pytest.mark.parametrize("seconds", [0.5, long(8.0)])
 def test_a_sweep_of_a_million_points_answers_at_once(seconds, tmp_path, sweep_file):
     """At any time after its start; in computing time, as others may use the machine as well."""
     output = tmp_path / "many.nc"

@@ -8,7 +8,7 @@ import tomllib
 import mesoslip
 import numpy as np
 import pytest
-from conftest import ROOT
+from conftest import ROOT, long
 from mesoslip import Config, ConfigError
 
 pytestmark = pytest.mark.usefixtures("no_step_errors")
@@ -78,7 +78,7 @@ def tree_mass(config):
     return contacts.film_density * contacts.area * contacts.film_thickness
 
 
-@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("sign", [long(1.0), -1.0])
 def test_static_friction_is_the_peak_of_the_force_curve(klein, sign):
     """Under a slow ramp the slider starts to slide at F_peak, up to the noise of N contacts."""
     config = klein(

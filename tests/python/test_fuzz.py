@@ -116,7 +116,7 @@ def wait_for_work(process: Command, seconds: float) -> float:
 @pytest.mark.parametrize(
     ("number", "times"),
     [
-        *((signal.SIGINT, 1), (signal.SIGTERM, 2), long(signal.SIGHUP, 1)),
+        *((signal.SIGTERM, 2), long(signal.SIGINT, 1), long(signal.SIGHUP, 1)),
         *(long(signal.SIGINT, 2), long(signal.SIGTERM, 1), long(signal.SIGHUP, 2)),
     ],
 )
@@ -138,7 +138,7 @@ def test_signals_while_the_output_is_written(number, times, folder):
         assert np.isfinite(tree.load()["spring_force"].values).all()
 
 
-@pytest.mark.parametrize("times", [1, 2])
+@pytest.mark.parametrize("times", [long(1), 2])
 def test_ctrl_c_before_the_first_event(times, folder):
     """While configuration, checkpoint and kernel are made, as with very many contacts."""
     case = long_run(folder, contacts__count=1_000_000, contacts__initial="steady")
@@ -191,7 +191,7 @@ SLOW = {
 
 @pytest.mark.parametrize(
     ("kind", "seconds"),
-    [long(kind, 0.2) if kind == "layers, bdf" else (kind, 0.2) for kind in SLOW]
+    [long(kind, 0.2) if kind in {"layers, bdf", "layers", "me"} else (kind, 0.2) for kind in SLOW]
     + [long(kind, 2.0) for kind in SLOW],
 )
 def test_runs_answer(kind, seconds, klein):

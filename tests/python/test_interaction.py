@@ -65,7 +65,7 @@ def column(realization: Realization, name: str) -> np.ndarray:
         ("triangular", (4, 4), {"contacts__delay": 0.0}),
     ],
 )
-@pytest.mark.parametrize("bonds", [0.3, 3.0])
+@pytest.mark.parametrize("bonds", [0.3, long(3.0)])
 def test_events_are_those_of_forces_recomputed_at_every_event(klein, kind, size, changes, bonds):
     config = klein(**FAST | lattice(kind, *size, bonds) | changes)
     oracle = exact_events(config, scan=1e-4)

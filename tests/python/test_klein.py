@@ -83,18 +83,18 @@ def last_drops(tree, span: float) -> np.ndarray:
 
 
 def test_without_delay_sliding_becomes_smooth(klein):
-    """S22: stick-slip dies out although K << K*; what stays is the noise of 1020 contacts.
+    """S22: stick-slip dies out although K << K*; what stays is the noise of 510 contacts.
 
-    A quarter of Klein's, with as large a swing until only the noise is left.
+    An eighth of Klein's, with as large a swing until only the noise is left.
     """
     tree = mesoslip.run(
-        klein(contacts__count=1020, contacts__delay=0.0, run__duration=400.0, output__interval=1e-2)
+        klein(contacts__count=510, contacts__delay=0.0, run__duration=300.0, output__interval=1e-2)
     )
     time, force = tree["time"].values, tree["spring_force"].values[0]
-    swing = [np.ptp(force[(time > end - 20) & (time < end)]) / 18e-6 for end in (40, 200, 400)]
+    swing = [np.ptp(force[(time > end - 20) & (time < end)]) / 18e-6 for end in (40, 150, 300)]
     assert swing[0] > 0.3
-    assert swing[1] < 0.15
-    assert swing[2] < 0.05
+    assert swing[1] < 0.2
+    assert swing[2] < 0.1
 
 
 def test_a_long_delay_gives_lasting_stick_slip(klein):

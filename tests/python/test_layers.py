@@ -73,7 +73,7 @@ def test_one_layer_is_the_rigid_slider(klein):
     np.testing.assert_allclose(one.slips, rigid.slips, rtol=1e-6, atol=1e-12)
 
 
-@pytest.mark.parametrize("layers", [16, 64])
+@pytest.mark.parametrize("layers", [16, long(64)])
 def test_frequencies_of_the_free_chain(klein, layers):
     """With all contacts broken, each mode moves at its frequency: amplitudes tell ω² to 10⁻⁶."""
     config = klein(
@@ -206,14 +206,10 @@ def test_static_stiffness(klein):
 @pytest.mark.parametrize(
     ("engine", "layers", "more"),
     [
-        ("eq", 16, {"base": BASE}),
-        ("eq", 16, {"layer_damping": 30.0}),
-        ("me", 4, {}),
+        ("eq", 16, {"layer_damping": 30.0, "base": BASE}),
         ("me", 4, {"layer_damping": 30.0, "base": BASE}),
-        long("eq", 16, {}),
-        long("eq", 16, {"layer_damping": 30.0, "base": BASE}),
-        long("me", 4, {"base": BASE}),
-        long("me", 4, {"layer_damping": 30.0}),
+        *(long("eq", 16, more) for more in ({}, {"base": BASE}, {"layer_damping": 30.0})),
+        *(long("me", 4, more) for more in ({}, {"base": BASE}, {"layer_damping": 30.0})),
     ],
 )
 def test_energy_balance_closes(klein, more, engine, layers):
@@ -229,7 +225,7 @@ def test_energy_balance_of_a_long_run(klein):
     assert abs(realization.energy_residual) < 1e-11
 
 
-@pytest.mark.parametrize("method", ["adams", "bdf"])
+@pytest.mark.parametrize("method", ["adams", long("bdf")])
 def test_cvode_converges_to_the_series(klein, method):
     """Forces through the first slip, with tolerance; and its own count of steps."""
     changes = {"contacts__count": 100, "run__duration": 1.93, "output__interval": 1e-4}
@@ -366,7 +362,7 @@ def test_the_slip_time_hardly_depends_on_the_layers(klein):
     [
         {"contacts__drag_rate": 2e16},
         {"slider": layered(16, base={"mass": 5e-3, "stiffness": 1e7})},
-        {"slider": layered(1) | {"mass": MASS * 1e-6}},
+        long({"slider": layered(1) | {"mass": MASS * 1e-6}}),
     ],
 )
 def test_stiff_cases_finish(klein, changes):

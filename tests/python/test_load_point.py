@@ -6,6 +6,7 @@ import time as clock
 
 import numpy as np
 import pytest
+from conftest import long
 from mesoslip.measured import load_point as stages_of_load_point
 from mesoslip.measured.load_point import drive_stages
 from mesoslip.measured.output_groups import stage_group
@@ -47,10 +48,10 @@ def check(found, stages, tolerance=0.01, late=0.1):
         assert one.end == pytest.approx(begin, abs=late + 0.11)
 
 
-@pytest.mark.parametrize("ratio", [1.5, 10.0, 1000.0])
+@pytest.mark.parametrize("ratio", [1.5, long(10.0), 1000.0])
 @pytest.mark.parametrize("noise", [0.0, 0.05 * UM])
 @pytest.mark.parametrize("step", [0.0, 0.1 * UM])
-@pytest.mark.parametrize("rates", [10, (10, 100)])
+@pytest.mark.parametrize("rates", [long(10), (10, 100)])
 def test_a_step_of_the_velocity(ratio, noise, step, rates):
     """The velocities agree within their errors, and the time to a tenth of a second."""
     stages = [(60, UM, UM), (60, ratio * UM, ratio * UM)]

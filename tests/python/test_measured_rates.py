@@ -10,6 +10,7 @@ from functools import partial
 import numpy as np
 import pytest
 import xarray as xr
+from conftest import long
 from mesoslip.analysis import response as responses
 from mesoslip.analysis.experiment_stages import Experiment
 from mesoslip.analysis.rate_and_state import (
@@ -38,7 +39,7 @@ STEP = [Loading(60, 3 * UM, 3 * UM), Loading(60, 10 * UM, 10 * UM)]
 STIFFNESS = 1e-3 / UM
 
 
-def trace(law=LAW, stages=STEP, noise=3e-4, rate=10.0, *, trend=0.0, known=True, seed=0):
+def trace(law=LAW, stages=STEP, noise=3e-4, rate=5.0, *, trend=0.0, known=True, seed=0):
     """A measured trace of friction coefficients."""
     duration = sum(one.duration for one in stages)
     # Two sampling rates in one file.
@@ -78,8 +79,13 @@ def check(row, law=LAW):
         assert row[f"{name}_error"] < 0.25 * value
 
 
-@pytest.mark.parametrize("evolution", ["ageing", "slip"])
-@pytest.mark.parametrize("slip_distance", [1 * UM, 60 * UM])
+@pytest.mark.parametrize(
+    ("evolution", "slip_distance"),
+    [
+        *(("ageing", 1 * UM), ("slip", 60 * UM)),
+        *(long("slip", 1 * UM), long("ageing", 60 * UM)),
+    ],
+)
 def test_a_step_is_found_over_decades(evolution, slip_distance):
     """With its law, which the record prefers."""
     law = Friction(0.6, 3 * UM, 0.01, 0.009, slip_distance, evolution)
@@ -146,7 +152,7 @@ def test_numbers_beyond_the_friction_are_refused():
 
 def test_a_stage_of_one_interval_holds_no_step():
     """A false stage in the load point: the record ends before it."""
-    experiment = Experiment(trace())
+    experiment = Experiment(trace(rate=10.0))
     first, second = experiment.stages
     experiment.stages = (
         first,

@@ -9,7 +9,7 @@ import mesoslip
 import numpy as np
 import pytest
 import xarray as xr
-from conftest import ROOT
+from conftest import ROOT, long
 from mesoslip.plots import movie as movies
 from mesoslip.plots.draw import movie_of
 from mesoslip.plots.style import styled
@@ -143,7 +143,7 @@ def test_the_load_of_ageing_contacts_is_that_of_the_moment():
     np.testing.assert_allclose(limits / limits[0], np.outer(grown / grown[0], np.ones(120)))
 
 
-@pytest.mark.parametrize("view", ["lattice", "contacts", "layers"])
+@pytest.mark.parametrize("view", ["lattice", "contacts", long("layers")])
 def test_what_changes_in_a_frame_is_drawn_as_in_the_whole_figure(
     few_snapshots, layered, view, monkeypatch
 ):

@@ -7,7 +7,7 @@ import functools
 import mesoslip
 import numpy as np
 import pytest
-from conftest import klein_tables
+from conftest import klein_tables, long
 from mesoslip import Config, ConfigError, SteadySliding
 from mesoslip.simulation.realization import Realization
 from mesoslip.theory.force_curve import ForceCurve
@@ -42,7 +42,7 @@ def steady(coupling):
     return np.sum(weight * (u**2 - f**2) / (2 * k)) / np.sum(weight * (u - f) / k)
 
 
-@pytest.mark.parametrize("coupling", ["equal", "scaled"])
+@pytest.mark.parametrize("coupling", [long("equal"), "scaled"])
 def test_the_steady_force_is_the_closed_form(klein, coupling):
     config = klein(**SLIDING | {"run": {"drive_displacement": 3e-7}}, contacts__coupling=coupling)
     expected = steady(coupling) * config.contacts.static_force

@@ -13,6 +13,7 @@ from oracles import stationary_force
 
 LAWS = {"gaussian": 0.2, "uniform": 0.3, "lognormal": 0.5, "weibull": 0.5, "exponential": 0.8}
 PRESCRIBED = {"slider": {"kind": "prescribed"}, "output__interval": 1e-3}
+LIKE_OTHERS = {"lognormal", "weibull"}
 
 
 def mean_force(config, skip: float) -> tuple[float, float]:
@@ -45,7 +46,7 @@ def test_slow_sliding_gives_the_stationary_force(klein, law, coupling):
 @pytest.mark.parametrize(
     ("law", "coupling"),
     [
-        *((law, "scaled") for law in LAWS),
+        *(long(law, "scaled") if law in LIKE_OTHERS else (law, "scaled") for law in LAWS),
         *(("gaussian", "equal") if law == "gaussian" else long(law, "equal") for law in LAWS),
     ],
 )
@@ -72,7 +73,7 @@ def test_the_delay_weakens_the_force_with_velocity(klein, law, coupling):
 @pytest.mark.parametrize(
     "changes",
     [
-        {"run__duration": 60.0},
+        {"run__duration": 30.0},
         {"contacts__count": 1},
         {"contacts__count": 2, "contacts__delay": 0.0, "slider__damping_ratio": 0.0},
         {"contacts__drag_rate": 2e16, "contacts__delay": 1e-2},
@@ -94,7 +95,7 @@ def test_the_delay_weakens_the_force_with_velocity(klein, law, coupling):
             }
         },
     ],
-    ids=["60 s", "one", "two", "strong drag", "million", "prescribed", "exponential", "stages"],
+    ids=["30 s", "one", "two", "strong drag", "million", "prescribed", "exponential", "stages"],
 )
 def test_energy_balance_closes(klein, changes):
     tree = mesoslip.run(klein(**changes))

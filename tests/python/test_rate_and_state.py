@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from conftest import long
 from mesoslip import _core
 from mesoslip.analysis.rate_and_state import (
     Loading,
@@ -178,7 +179,7 @@ def test_an_unstable_motion_fails():
     assert not found.jacobian(at).any()
 
 
-@pytest.mark.parametrize(("name", "length"), [("ageing", 0.0), ("ageing", 2e-6), ("slip", 0.0)])
+@pytest.mark.parametrize(("name", "length"), [long("ageing", 0.0), ("ageing", 2e-6), ("slip", 0.0)])
 def test_parameters_are_found_again_within_their_errors(name, length):
     """The number of traces is small; tests/studies/response_coverage.py has hundreds."""
     found = [synthetic_fit(name, length, seed) for seed in range(5)]

@@ -219,6 +219,7 @@ def stored(tmp_path_factory):
     return path
 
 
+@pytest.mark.usefixtures("quick_pictures")
 def test_the_command_prints_and_writes_a_posterior(command, stored, monkeypatch):
     """Each line of the table has the verdict; the file opens as those of fits do."""
     path, table = stored.with_name("step.rates.nc"), stored.with_suffix(".csv")

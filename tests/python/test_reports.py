@@ -12,6 +12,7 @@ import pytest
 import xarray as xr
 from conftest import ROOT, klein_tables, long
 from kinds import DIFFERENT, KINDS, configuration
+from mesoslip.analysis.rate_and_state import fit_laws
 from mesoslip.output.kinds import KINDS as OUTPUTS
 from mesoslip.plots.views.run import caption
 from mesoslip.quantities import column
@@ -105,7 +106,10 @@ def test_a_report_of_kleins_run(klein_run, tmp_path):
 
 
 # Pages of them are those of others, with more columns or fewer sections.
-LIKE_OTHERS = {"rigid, lattice", "layered, me", "rigid, bundle", "rigid, three realizations"}
+LIKE_OTHERS = {
+    *("rigid, lattice", "layered, me", "rigid, bundle", "rigid, three realizations"),
+    *("rigid, to a slip", "rigid, thermal", "quasistatic, force", "rigid"),
+}
 
 
 @pytest.mark.parametrize(
@@ -119,7 +123,12 @@ def test_there_is_a_report_of_every_kind(kind, tmp_path):
     assert "svg" in page.tags
 
 
-def test_a_report_has_what_is_read_off_a_drive_with_stages(klein, tmp_path):
+def test_a_report_has_what_is_read_off_a_drive_with_stages(klein, tmp_path, monkeypatch):
+    # Fits of several laws take seconds, and have tests of their own.
+    for module in ("analysis.rate_and_state.rows", "plots.views.response"):
+        monkeypatch.setattr(
+            f"mesoslip.{module}.fit_laws", lambda record, *_: fit_laws(record, ("slip",))
+        )
     stages = [
         {"displacement": 1e-7, "velocity": 1e-6},
         {"duration": 0.1, "velocity": 0.0},
@@ -199,8 +208,9 @@ def test_outputs_side_by_side(klein_run, tmp_path, klein):
     assert "Differences" in page.words
     place = page.words.index("contacts.delay (ms)")
     assert page.words[place + 1 : place + 3] == ["1", "2"]
+    curve = mesoslip.curve(klein(curve={"length": 3 * klein().contacts.break_stretch}))
     with pytest.raises(mesoslip.FileError, match=r"is a run.* is a force curve"):
-        mesoslip.report([klein_run, mesoslip.curve(klein())], tmp_path / "no.html")
+        mesoslip.report([klein_run, curve], tmp_path / "no.html")
     assert not (tmp_path / "no.html").exists()
 
 
@@ -236,7 +246,8 @@ def test_the_command_writes_a_page(tmp_path, command):
 
 def test_a_method_of_the_theory_has_no_duration(klein):
     """A settled motion is of no run, and an irregular one has no period."""
-    found = mesoslip.onset(klein()).attrs["configuration"]
+    near = {"length": 3 * klein().contacts.break_stretch}
+    found = mesoslip.onset(klein(curve=near)).attrs["configuration"]
     config = mesoslip.Config.from_toml(found)
     tree = xr.DataTree(xr.Dataset(attrs={"settled_motion": "periodic"}))
     text = " ".join(cycle_method(tree, config.replace("run.engine=me", "run.duration=1e9")))

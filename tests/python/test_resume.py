@@ -20,7 +20,7 @@ import tomli_w
 import xarray as xr
 from conftest import klein_tables, long
 from invariants import differences
-from kinds import KINDS, RANDOM, THERMAL, configuration, pairwise
+from kinds import COARSE, KINDS, RANDOM, THERMAL, configuration, pairwise
 from mesoslip import Config, FileError, RunError
 from mesoslip.errors import NoMemoryError
 from mesoslip.execution.store import Folder
@@ -48,9 +48,10 @@ SHORT = {
 
 
 def short_configuration(kind: str) -> Config:
-    """The short run of a kind, a shorter one of a master equation with the drive of most kinds."""
-    is_shorter = ", me" in kind and "drive" not in KINDS[kind]
-    return configuration(kind, **SHORT if is_shorter else {})
+    """The short run of a kind; of a master equation in long steps, mostly with a shorter drive."""
+    if ", me" not in kind:
+        return configuration(kind)
+    return configuration(kind, **COARSE | ({} if "drive" in KINDS[kind] else SHORT))
 
 
 def whole(kind: str) -> xr.DataTree:
@@ -696,7 +697,7 @@ def test_killed_runs_go_on(long_run, tmp_path):
 
 
 @pytest.mark.parametrize("long_run", ["fewer contacts"], indirect=True)
-def test_ctrl_c_reports_how_to_go_on(long_run, tmp_path):
+def test_ctrl_c_reports_how_to_go_on(long_run, tmp_path, command):
     """A partial file to look at, a checkpoint to go on from, exit status 130; twice is no harm."""
     output = tmp_path / "stopped.nc"
     state = checkpoint_folder(output) / "state.npz"
@@ -714,7 +715,6 @@ def test_ctrl_c_reports_how_to_go_on(long_run, tmp_path):
     assert "--resume" in again.stderr.readline()
     again.kill()
     again.communicate()
-    process = start(long_run, output, "--resume")
-    _, printed = process.communicate()
-    assert process.returncode == 0, printed
+    status, _, printed = command("run", long_run, "-o", output, "--resume")
+    assert status == 0, printed
     assert sorted(path.name for path in tmp_path.iterdir()) == ["long.toml", "stopped.nc"]

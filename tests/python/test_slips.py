@@ -85,7 +85,10 @@ def test_a_film_that_breaks_as_a_whole_slips(klein, slider):
 
 @pytest.mark.parametrize(
     "slider",
-    [LAYERED, LAYERED | {"layers": 4, "base": {"mass": 0.02, "stiffness": 500.0, "damping": 5.0}}],
+    [
+        long(LAYERED),
+        LAYERED | {"layers": 4, "base": {"mass": 0.02, "stiffness": 500.0, "damping": 5.0}},
+    ],
     ids=["undamped", "on a soft base"],
 )
 def test_slips_of_a_block_that_rings_for_ever(klein, slider):

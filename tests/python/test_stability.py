@@ -73,7 +73,7 @@ def test_unstable_modes_of_layers_with_temperature(klein, layers, damping):
 @pytest.mark.parametrize(
     ("contacts", "velocity"),
     [
-        ({"thermal": {"rate": 1e4, "force_ratio": 0.1}}, 1e-5),
+        long({"thermal": {"rate": 1e4, "force_ratio": 0.1}}, 1e-5),
         ({"thermal": {"rate": 1e4, "force_ratio": 0.1}, "delay_law": "exponential"}, 1e-5),
         ({"ageing": LOG, "delay": 0.0}, 1e-5),
     ],
@@ -135,7 +135,7 @@ def test_a_critical_spring_between_the_frequencies_of_the_path_is_found():
     assert found == pytest.approx((1e-3 * frequency**2, frequency), rel=1e-6)
 
 
-@pytest.mark.parametrize(("layers", "damping"), [(2, 300.0), (8, 500.0)])
+@pytest.mark.parametrize(("layers", "damping"), [(2, 300.0), long(8, 500.0)])
 def test_the_critical_spring_of_layers_is_where_stability_ends(klein, layers, damping):
     """By counting roots; with much stiffer springs as well."""
     changes = {

@@ -266,7 +266,7 @@ def test_points_over_a_key_have_errors_and_only_rows_that_occur():
     assert figure.get_suptitle() == "Delays"
 
 
-@pytest.mark.parametrize("count", range(1, 7))
+@pytest.mark.parametrize("count", [2, 5, *map(long, [1, 3, 4, 6])])
 def test_no_part_of_an_overview_is_empty(count):
     """Panels with their colour bars fill their rows, and none covers another."""
     keys = ("contacts.delay", "slider.stiffness", "realization")
@@ -454,7 +454,7 @@ def assert_same_numbers(one: xr.Dataset, other: xr.Dataset) -> None:
 
 
 @pytest.mark.parametrize(
-    "executor", [mesoslip.Threads(2), long(mesoslip.Processes(1)), mesoslip.Processes(2), 2]
+    "executor", [mesoslip.Threads(2), mesoslip.Processes(2), *map(long, [mesoslip.Processes(1), 2])]
 )
 def test_the_executor_does_not_matter(executor, whole):
     data = mesoslip.sweep(tables(realizations=3), executor=executor)

@@ -91,7 +91,7 @@ def slow(tree):
 
 
 @pytest.mark.parametrize("pool", [long("threads"), "processes"])
-def test_ctrl_c_keeps_what_is_done(pool, tmp_path, sweep_file):
+def test_ctrl_c_keeps_what_is_done(pool, tmp_path, sweep_file, command):
     """It ends at once, with all its workers, and what there is can be looked at."""
     (tmp_path / "own.py").write_text(OWN)
     (tmp_path / "slow").touch()
@@ -115,8 +115,9 @@ def test_ctrl_c_keeps_what_is_done(pool, tmp_path, sweep_file):
     assert np.sum(partial["status"].values == 2) == 40 - kept
     assert not output.exists()
     (tmp_path / "slow").unlink()
-    process = begin(sweep_file(SLOW), output, "--pool", "threads", "--workers", "2")
-    _, printed = process.communicate(timeout=60)
+    _, _, printed = command(
+        "sweep", sweep_file(SLOW), "-o", output, "--pool", "threads", "--workers", "2"
+    )
     assert f"{40 - kept} points computed, {kept} read from the store" in printed
     assert not (tmp_path / "out" / "sweep.partial.nc").exists()
 

@@ -51,7 +51,7 @@ def extrapolated_force(velocity: float, distance: float, **changes: Any) -> floa
     return (4 * fine - coarse) / 3 / COUNT
 
 
-@pytest.mark.parametrize(("velocity", "force"), [(1e-4, 0.3721068), (1e-2, 0.4634253)])
+@pytest.mark.parametrize(("velocity", "force"), [long(1e-4, 0.3721068), (1e-2, 0.4634253)])
 def test_steady_force_is_the_closed_form_to_six_digits(velocity, force):
     assert extrapolated_force(velocity, 90.0) == pytest.approx(force, abs=1e-6)
 
@@ -62,7 +62,7 @@ def test_steady_force_is_the_closed_form_to_six_digits(velocity, force):
         ({"law": "uniform", "relative_width": 0.3}, 0.04, 1e-3),
         long({"law": "weibull", "relative_width": 0.4}, 0.04, 1e-2),
         ({"law": "exponential", "relative_width": 1.0}, 0.01, 1e-2),
-        ({"law": "lognormal", "relative_width": 0.2}, 1.0, 1.0),
+        long({"law": "lognormal", "relative_width": 0.2}, 1.0, 1.0),
         (TABLE, 0.02, 1e-5),
         ({"law": "gaussian", "relative_width": 0.2}, 1e-3, 1e-4),
     ],
@@ -110,7 +110,7 @@ def test_creep_under_a_force_is_the_inverse_of_the_steady_force(force):
     duration = 12 / velocity
     config = unit(
         COUNT,
-        run={"engine": "me", "duration": duration, "resolution": 0.25},
+        run={"engine": "me", "duration": duration, "resolution": 0.5},
         output__interval=duration / 12,
         **changes,
     )
@@ -145,7 +145,7 @@ def test_errors_are_of_second_order_with_slips_and_reversals(kind):
     """Or smaller: with coarser steps slips come too early or too late."""
     coarse, middle, fine = (
         finished(configuration(kind, run__engine="me", run__resolution=resolution)).trace[:, 5]
-        for resolution in (0.5, 0.25, 0.125)
+        for resolution in (1.0, 0.5, 0.25)
     )
     ratio = np.linalg.norm(coarse - middle) / np.linalg.norm(middle - fine)
     assert ratio > 3
@@ -192,9 +192,9 @@ def test_energy_is_balanced(changes):
 
 
 def test_an_output_has_the_error_of_its_force():
-    config = configuration("prescribed, thermal", run__engine="me", run__resolution=0.5)
+    config = configuration("prescribed, thermal", run__engine="me", run__resolution=1.0)
     tree = mesoslip.run(config)
-    fine = finished(config.replace({"run.resolution": 0.1})).trace[:, 5]
+    fine = finished(config.replace({"run.resolution": 0.2})).trace[:, 5]
     error = np.max(np.abs(np.ravel(tree["contact_force"]) - fine))
     assert 0.2 * error < float(tree["force_error"].item()) < 5 * error
 

@@ -139,6 +139,7 @@ def test_the_other_direction_is_the_same():
     np.testing.assert_allclose(forward.force_before, -backward.force_before)
 
 
+@pytest.mark.usefixtures("quick_pictures")
 def test_a_table_becomes_an_output(tmp_path, command):
     """On which commands work like on that of a run."""
     run = mesoslip.run(klein_tables(**HIDDEN))
@@ -210,6 +211,7 @@ def test_with_a_configuration_it_is_an_output_of_that(tmp_path):
     assert tree["displacement"].values[0, 0] == 0
 
 
+@pytest.mark.usefixtures("quick_pictures")
 def test_analyses_of_a_trace_with_and_without_configuration(tmp_path, command):
     run = mesoslip.run(klein_tables(run__duration=6.0))
     lines = zip(run["time"].values, 1e6 * run["spring_force"].values[0], strict=True)

@@ -6,6 +6,7 @@ answer for it has to say so: kinds of the kernel, theories, reports.
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
@@ -32,14 +33,14 @@ if KIND:
     contacts.KINDS += (SofteningContacts,)
 """
 RUN = """
-config = mesoslip.Config.load(RUN, ["contacts.softening=0.5", "run.duration=1 s", *CHANGES])
+config = mesoslip.Config.load(RUN, ["contacts.softening=0.5", "run.duration=1 s"])
 """
 
 
-def outcome(program: str, *, kind: bool, changes: tuple[str, ...] = ()) -> str:
+def outcome(program: str, *, kind: bool) -> str:
     """The last line of what a program with the planted key prints, errors included."""
     run = str(ROOT / "runs" / "klein.toml")
-    start = f"KIND, RUN, CHANGES = {kind}, {run!r}, {changes!r}"
+    start = f"KIND, RUN = {kind}, {run!r}"
     done = subprocess.run(
         [sys.executable, "-c", start + PLANT + program],
         capture_output=True,
@@ -50,16 +51,9 @@ def outcome(program: str, *, kind: bool, changes: tuple[str, ...] = ()) -> str:
     return (done.stderr or done.stdout).strip().splitlines()[-1]
 
 
-@pytest.mark.parametrize("engine", ["eq", "me"])
-def test_a_key_without_a_kind_is_an_error_of_the_configuration(engine):
-    printed = outcome(RUN, kind=False, changes=(f"run.engine={engine}",))
+def test_a_key_without_a_kind_is_an_error_of_the_configuration():
+    printed = outcome(RUN, kind=False)
     assert "contacts.softening: is not known to contacts of the kind" in printed
-
-
-def test_a_kind_of_one_engine_is_none_of_the_other():
-    printed = outcome(RUN, kind=True, changes=("run.engine=me",))
-    assert 'contacts.softening: is not known to contacts of the kind "populations"' in printed
-    assert outcome(RUN + "print(config.contact_kind)", kind=True).startswith("SofteningContacts")
 
 
 # Every public function of theory, and what asks theory by the way.
@@ -78,41 +72,47 @@ QUESTIONS = {
 }
 
 
-def test_a_kind_without_a_theory_is_refused_by_every_question(tmp_path):
-    """All are asked in one program, as each start takes half a second."""
-    lines = [RUN, f"OUT = {str(tmp_path / 'report.html')!r}", "answers = {}"]
-    for name, question in QUESTIONS.items():
-        lines += [
-            "try:",
-            f"    {question}",
-            f"    answers[{name!r}] = 'answered'",
-            "except mesoslip.MesoslipError as error:",
-            f"    answers[{name!r}] = str(error)",
-        ]
-    lines += [
-        "from mesoslip.theory.steady_sliding import steady_sliding",
-        "assert steady_sliding(config, 10**6) is None",
-        "print({name: one for name, one in answers.items() if 'contacts.softening' not in one})",
-    ]
-    assert outcome("\n".join(lines), kind=True) == "{}"
-
-
-def test_commands_refuse_a_kind_without_a_theory():
-    program = """
+# What commands answer, and the other engine, of which it is no kind.
+COMMANDS = """
 import contextlib, io, sys
 from mesoslip.command_line.main import main
-answers = {}
 for command in (["info"], ["curve"], ["onset"], ["cycle"]):
     sys.argv = ["mesoslip", *command, RUN, "--set", "contacts.softening=0.5"]
     with contextlib.redirect_stderr(io.StringIO()) as printed:
         try:
             main()
         except SystemExit as end:
-            answers[command[0]] = end.code == 2 and "contacts.softening" in printed.getvalue()
-print(answers)
+            if end.code == 2:
+                answers[f'mesoslip {command[0]}'] = printed.getvalue()
+try:
+    config.replace("run.engine=me")
+except mesoslip.ConfigError as error:
+    answers["me"] = str(error)
+print(json.dumps(answers))
 """
-    expected = {"info": True, "curve": True, "onset": True, "cycle": True}
-    assert outcome(program, kind=True) == str(expected)
+
+
+def test_a_kind_without_a_theory_is_refused_by_every_question_and_command(tmp_path):
+    """All are asked in one program, as each start takes half a second."""
+    lines = ["import json", RUN, f"OUT = {str(tmp_path / 'report.html')!r}", "answers = {}"]
+    for name, question in QUESTIONS.items():
+        lines += [
+            "try:",
+            f"    {question}",
+            "except mesoslip.MesoslipError as error:",
+            f"    answers[{name!r}] = str(error)",
+        ]
+    lines += [
+        "from mesoslip.theory.steady_sliding import steady_sliding",
+        "assert steady_sliding(config, 10**6) is None",
+        "assert isinstance(config.contact_kind, SofteningContacts)",
+        COMMANDS,
+    ]
+    answers = json.loads(outcome("\n".join(lines), kind=True))
+    commands = {f"mesoslip {one}" for one in ("info", "curve", "onset", "cycle")}
+    assert answers.keys() == {*QUESTIONS, *commands, "me"}
+    assert all("contacts.softening" in one for one in answers.values()), answers
+    assert 'is not known to contacts of the kind "populations"' in answers["me"]
 
 
 def test_a_law_of_delays_without_a_theory_is_refused(klein, monkeypatch):

@@ -95,6 +95,9 @@ def test_a_configuration_is_no_output(short, command):
         ("plot", "/dev/zero"),
         ("run", "short.toml", "-o", "loop/out.nc"),
         ("run", "short.toml", "-o", "/proc/nowhere/out.nc"),
+        ("run", "short.toml", "-o", "/proc/out.nc"),
+        ("plot", "in.nc", "-o", "picture"),
+        ("plot", "in.nc", "-o", "picture.tex"),
     ],
 )
 def test_inputs_and_devices_are_not_overwritten(arguments, short, tmp_path, command, monkeypatch):
@@ -109,6 +112,7 @@ def test_inputs_and_devices_are_not_overwritten(arguments, short, tmp_path, comm
     status, _, printed = command(*arguments)
     assert status == 2
     assert printed.startswith("mesoslip: ")
+    assert ("ends in one of" in printed) == ("picture" in arguments[-1])
     assert {path: path.lstat().st_mode for path in tmp_path.rglob("*")} == before
     assert {path: path.read_bytes() for path in held} == held
     assert Path("/dev/null").is_char_device()
@@ -181,7 +185,7 @@ def test_a_full_disk_keeps_the_table_that_was_there(tmp_path, monkeypatch):
 
 
 class Free:
-    free = 0
+    free, total = 0, 4096
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no full device here")

@@ -202,7 +202,7 @@ def _regimes(results: Results, path: Path, stop: Stop) -> str:
 
     found: list[regime.RegimeResult] = []
     count = len(results.realizations)
-    with progress_shown(False, "regimes") as progress:
+    with progress_shown(count == 1, "regimes") as progress:
         for one in regime.regimes_of_results(results):
             if stop.is_set():
                 return f"complete; 'mesoslip regime {path}' prints the regime"

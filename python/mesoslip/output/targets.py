@@ -105,7 +105,9 @@ def _not_written(path: Path, target: Path, error: Exception) -> FileError:
     is_full = getattr(error, "errno", None) in {errno.ENOSPC, errno.EDQUOT}
     # HDF5 reports a full disk as an error of its own, or as a lack of permission.
     with suppress(OSError):
-        is_full = is_full or shutil.disk_usage(target.parent).free < PROBE_BYTES
+        disk = shutil.disk_usage(target.parent)
+        # A file system of the kernel, as /proc, has no disk.
+        is_full = is_full or disk.free < PROBE_BYTES <= PROBE_BYTES * disk.total
     if is_full:
         return WriteError(f"{path}: cannot be written: no space left on the disk")
     if "HDF" in str(error):

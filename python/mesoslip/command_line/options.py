@@ -203,11 +203,11 @@ def quantity(
     negative: bool = True,
 ) -> float:
     """The value of an option that is a quantity, in SI."""
-    from mesoslip.configuration.units import to_si
+    from mesoslip.configuration.units import text_to_si
     from mesoslip.errors import ConfigError, Problem
 
     try:
-        value = to_si(_number_or_text(text), unit, example)
+        value = text_to_si(text, unit, example)
     except ValueError as error:
         raise ConfigError([Problem("", option, str(error), text)]) from None
     if positive and value <= 0:
@@ -215,16 +215,6 @@ def quantity(
     if not negative and value < 0:
         raise ConfigError([Problem("", option, "must not be negative", text)])
     return value
-
-
-def _number_or_text(text: str) -> float | str:
-    """A plain number, which is in SI; or a string with a unit."""
-    from mesoslip.configuration.units import number_of
-
-    try:
-        return number_of(text)
-    except ValueError:
-        return text
 
 
 def quantity_or_none(

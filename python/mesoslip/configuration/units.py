@@ -109,6 +109,15 @@ def to_si(value: object, unit: str, example: str) -> float:
     return number
 
 
+def text_to_si(text: str, unit: str, example: str) -> float:
+    """A quantity that was typed, as `to_si`: one without a unit is a number in SI."""
+    try:
+        value: float | str = number_of(text)
+    except ValueError:
+        value = text
+    return to_si(value, unit, example)
+
+
 def _parse(text: str, unit: str, wanted: str) -> float:
     """A string as a number in SI."""
     text = text.strip()

@@ -19,6 +19,14 @@ HEAP = b"GCOL\x01\0\0\0"
 CHECKED_BYTES = 2**23
 
 
+def check_name(path: Path) -> None:
+    """Refuse a name that netCDF's library does not take."""
+    try:
+        str(path).encode()
+    except UnicodeEncodeError:
+        raise FileError(f"{path}: the name of an output must be UTF-8 for netCDF") from None
+
+
 def check_heaps(file: IO[bytes]) -> None:
     """Refuse a file with a damaged heap, the part without checksums that the library may read
     endlessly; an `OSError`, as the library raises for other damages."""

@@ -21,6 +21,7 @@ from typing import NamedTuple
 from mesoslip.configuration.reading import is_directory
 from mesoslip.errors import FileError, WriteError
 from mesoslip.output.file_locks import NO_LOCKS, refused_lock
+from mesoslip.output.hdf5 import check_name
 
 # Endings of files other than outputs.
 OTHER_KINDS = {".csv", ".txt", ".png", ".pdf", ".svg", ".html", ".json"}
@@ -42,6 +43,7 @@ def check_output(path: Path, reads: Iterable[str | Path] = ()) -> None:
             f"{path}: an output is netCDF, and its name must not end in {path.suffix}; "
             f"use {path.with_suffix('.nc')}"
         )
+    check_name(path)
     _check(path, reads, is_output=True)
 
 

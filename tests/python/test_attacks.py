@@ -98,6 +98,9 @@ def test_a_configuration_is_no_output(short, command):
         ("plot", "/dev/zero"),
         ("run", "short.toml", "-o", "loop/out.nc"),
         ("run", "short.toml", "-o", "/proc/nowhere/out.nc"),
+        ("run", "short.toml", "-o", "/proc/out.nc"),
+        ("plot", "in.nc", "-o", "picture"),
+        ("plot", "in.nc", "-o", "picture.tex"),
     ],
 )
 def test_inputs_and_devices_are_not_overwritten(arguments, short, tmp_path, command, monkeypatch):
@@ -112,6 +115,7 @@ def test_inputs_and_devices_are_not_overwritten(arguments, short, tmp_path, comm
     status, _, printed = command(*arguments)
     assert status == 2
     assert printed.startswith("mesoslip: ")
+    assert ("ends in one of" in printed) == ("picture" in arguments[-1])
     assert {path: path.lstat().st_mode for path in tmp_path.rglob("*")} == before
     assert {path: path.read_bytes() for path in held} == held
     assert Path("/dev/null").is_char_device()
@@ -184,7 +188,7 @@ def test_a_full_disk_keeps_the_table_that_was_there(tmp_path, monkeypatch):
 
 
 class Free:
-    free = 0
+    free, total = 0, 4096
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no full device here")
@@ -210,9 +214,18 @@ def test_names_that_are_not_utf_8(short, tmp_path, command):
     strange = os.fsdecode(bytes(tmp_path) + b"/\xff.toml")
     Path(strange).write_bytes(short.read_bytes())
     assert command("run", strange, "-o", tmp_path / "out.nc")[0] == 0
-    status, _, printed = command("run", strange, "-o", strange[:-5] + ".nc")
-    assert status in {0, 2}
-    assert printed.count("mesoslip: ") == (status == 2)
+    # Before the run, whose results could not be written.
+    output = Path(strange).with_suffix(".nc")
+    reason = "the name of an output must be UTF-8 for netCDF\n"
+    status, _, printed = command("run", strange, "-o", output)
+    assert status == 2
+    assert printed.endswith(f": {reason}")
+    assert printed.count("\n") == 1
+    assert not list(tmp_path.glob("*.checkpoint"))
+    (tmp_path / "out.nc").rename(output)
+    status, _, printed = command("slips", output)
+    assert status == 2
+    assert printed.endswith(f": {reason}")
     assert command("slips", strange)[0] == 2
 
 

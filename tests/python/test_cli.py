@@ -6,7 +6,9 @@ import contextlib
 import csv
 import json
 import math
+import os
 import re
+import signal
 import subprocess
 import sys
 
@@ -17,6 +19,7 @@ import pytest
 import tomli_w
 import xarray as xr
 from conftest import ROOT, klein_tables, long
+from mesoslip.analysis.regime import outputs
 from mesoslip.command_line.main import COMMANDS, GROUPS
 from mesoslip.command_line.progress import say
 from mesoslip.errors import RunError
@@ -210,6 +213,29 @@ def test_of_many_rows_the_first_and_the_last_are_printed(tmp_path, command, monk
     assert "… (2 others, all with --json)" in regimes
 
 
+def test_an_interrupt_after_the_output_is_written_is_answered_at_once(
+    short, tmp_path, command, monkeypatch
+):
+    """Regimes of many short realizations take longer than their runs, and can be had later."""
+    output, judged = tmp_path / "run.nc", []
+    classify = outputs.classify
+
+    def classify_once(*arguments):
+        judged.append(arguments)
+        os.kill(os.getpid(), signal.SIGINT)
+        return classify(*arguments)
+
+    monkeypatch.setattr(outputs, "classify", classify_once)
+    many = ("--set", "run.realizations=20", "--set", "run.duration=0.1 s")
+    status, _, err = command("run", short, "-o", output, *many)
+    assert status == 0
+    assert len(judged) == 1
+    assert f"{output}: complete; 'mesoslip regime {output}' prints the regime\n" in err
+    assert list(tmp_path.glob("run.*")) == [output]
+    monkeypatch.undo()
+    assert command("regime", output)[1].count("realization ") == 20
+
+
 def test_all_that_takes_a_while_reports_its_progress(tmp_path, command, monkeypatch):
     """Where there is no terminal too: writing after the run, measured traces, movies; and a large
     output before the run."""
@@ -271,6 +297,7 @@ def test_commands_import_what_they_need(short, tmp_path, command):
     ]
     code = f"""
 import json, sys
+from mesoslip.analysis.regime import outputs
 from mesoslip.command_line.main import main
 large = ["dask", "matplotlib", "mpl_toolkits.mplot3d", "netCDF4", "pandas", "pint", "xarray"]
 large += [f"scipy.{{one}}" for one in ("integrate", "interpolate", "optimize", "special", "stats")]

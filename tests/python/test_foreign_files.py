@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import struct
 import subprocess
 import sys
 
@@ -79,6 +80,45 @@ def test_an_output_refers_to_nothing_outside_of_it(output, tmp_path, attack, com
         assert status == 2
         assert "damaged" not in printed
         assert printed.count("\n") == 1
+
+
+def _damage_heap(path, values):
+    """Write an object's number, uses and size over those of the free space of the heap."""
+    data = path.read_bytes()
+    start = data.index(b"GCOL")
+    at = start + 16
+    while data[at : at + 2] != bytes(2):
+        at += 16 + -(-int.from_bytes(data[at + 8 : at + 16], "little") // 8) * 8
+    assert at + int.from_bytes(data[at + 8 : at + 16], "little") == start + 4096
+    path.write_bytes(data[:at] + struct.pack("<HHIQ", *values) + data[at + 16 :])
+
+
+# Of nothing; and of a size that the library counts as nothing, or as less.
+@pytest.mark.parametrize("values", [(0, 0, 0, 0), (9, 1, 0, 2**64 - 16), (0, 0, 0, 2**64 - 24)])
+def test_a_damaged_heap_is_not_read_without_end(output, values, tmp_path):
+    """The library would not return, nor answer Ctrl-C: hence programs of their own."""
+    table = tmp_path / "measured.h5"
+    with h5py.File(table, "w") as file:
+        for name, unit in (("time", "s"), ("force", "N")):
+            file[name] = np.arange(100.0)
+            file[name].attrs["units"] = unit
+    commands = (["slips", output], ["trace", table, "-o", tmp_path / "new.nc"])
+    for arguments, words in zip(commands, ("netCDF-4 file", "file of HDF5"), strict=True):
+        _damage_heap(arguments[1], values)
+        program = [sys.executable, "-m", "mesoslip", *map(str, arguments)]
+        result = subprocess.run(program, capture_output=True, text=True, check=False, timeout=60)
+        assert result.returncode == 2
+        assert f"{arguments[1]}: a damaged {words}" in result.stderr
+    with pytest.raises(mesoslip.FileError, match="damaged"):
+        mesoslip.open_output(output)
+
+
+def test_sound_heaps_are_read_wherever_they_are(output, monkeypatch):
+    """One that lies at an end of what is checked too."""
+    size = output.read_bytes().index(b"GCOL") + 700
+    for checked in (size, output.stat().st_size - size, 64):
+        monkeypatch.setattr("mesoslip.output.hdf5.CHECKED_BYTES", checked)
+        mesoslip.open_output(output)
 
 
 def test_a_configuration_of_an_output_reads_no_file(output, tmp_path, command):

@@ -696,7 +696,8 @@ def test_the_command_prints(runs, tmp_path, command):
     status, _, errors = command("plot", output, "-o", tmp_path / "a.png", "--format", "pdf")
     assert status == 2
     assert "--format" in errors
-    assert command("plot", output, "--width", "elsevier-1", "-o", tmp_path / "b.svg")[0] == 0
+    for width in ("elsevier-1", "0.086"):
+        assert command("plot", output, "--width", width, "-o", tmp_path / "b.svg")[0] == 0
     status, _, errors = command("plot", output, "--width", "3 N")
     assert status == 2
     assert "aps-1, aps-2" in errors

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import json
 import os
+import re
 import subprocess
 import sys
 import textwrap
@@ -785,6 +786,22 @@ def test_a_sweep_needs_a_sweep(tmp_path, command):
     assert status == 2
     with pytest.raises(ConfigError, match="executor"):
         mesoslip.sweep(tables(), executor="swimming")
+
+
+def test_many_combinations_are_checked_with_progress_or_refused(
+    tmp_path, sweep_file, command, monkeypatch
+):
+    """10⁶ of them take 4 minutes and 9 GB, before the first run or an estimate."""
+    arguments = ("sweep", sweep_file(SIMPLE), "-o", tmp_path / "out.nc", "--dry-run")
+    monkeypatch.setattr("mesoslip.command_line.progress.PATIENCE", -1.0)
+    monkeypatch.setattr("mesoslip.campaign.sweep_plan.STEP", 1)
+    status, _, err = command(*arguments)
+    assert status == 0
+    assert "checking: 50 % after 0 s" in err
+    monkeypatch.setattr("mesoslip.campaign.sweep_plan.free_memory", lambda: 1e3)
+    status, _, err = command(*arguments)
+    assert status == 2
+    assert re.search(r"sweep: has \d+ combinations, which take about .* GiB of memory", err)
 
 
 def test_a_dry_run_runs_nothing(tmp_path, sweep_file, command):

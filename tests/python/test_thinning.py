@@ -12,6 +12,7 @@ import pytest
 from mesoslip.errors import FileError
 from mesoslip.measured import measured_record, thinning
 from mesoslip.measured.reading import blocks
+from mesoslip.measured.reading.source import bytes_of
 
 RATE, COUNT = 1000.0, 30000
 TIME = np.arange(COUNT) / RATE
@@ -132,6 +133,22 @@ def test_gaps_and_missing_numbers_stay(tmp_path):
     assert not ((time > 12.01) & (time < 16.99)).any()
     assert time.size == pytest.approx(500, abs=2)
     assert tree["spring_force"].values == pytest.approx(5.0)
+
+
+@pytest.mark.usefixtures("small_blocks")
+@pytest.mark.parametrize("more", [b"", b"40.0,0\n"], ids=["shorter", "longer"])
+def test_a_file_that_changes_while_it_is_read_is_refused(tmp_path, more, monkeypatch):
+    """Cut short by its program, or longer; read in blocks, and at once."""
+    path = written(tmp_path / "a.csv", np.sin(TIME))
+    whole = path.read_bytes()
+    found = blocks.blocks_of(path)
+    next(found)
+    path.write_bytes(whole + more if more else whole[: 2**16])
+    with pytest.raises(FileError, match="changed while it was read"):
+        list(found)
+    monkeypatch.setattr("pathlib.Path.read_bytes", lambda _: whole)
+    with pytest.raises(FileError, match="changed while it was read"):
+        bytes_of(path)
 
 
 def test_what_cannot_be_thinned(tmp_path):

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -25,9 +25,13 @@ from mesoslip.configuration.files import Change, Merged, on_base, override, read
 from mesoslip.configuration.messages import problems
 from mesoslip.configuration.reading import PathLike, as_path
 from mesoslip.errors import ConfigError, Problem
+from mesoslip.simulation.memory import free_memory
 
 # Maximum number of wrong combinations that are listed.
 MAX_REPORTED = 5
+# Combinations after which progress is reported, and memory that each takes [bytes].
+STEP = 1000
+COMBINATION_BYTES = 9e3
 
 
 class Plan:
@@ -84,12 +88,29 @@ class Plan:
     @cached_property
     def combinations(self) -> tuple[Combination, ...]:
         """All combinations, in the order of the dataset; a `ConfigError` says which are wrong."""
+        return self._checked(lambda _: None)
+
+    def check(self, progress: Callable[[float], None]) -> None:
+        """Make all `combinations`, of which 10⁶ take minutes; see `run_sweep` for ``progress``."""
+        self.combinations = self._checked(progress)
+
+    def _checked(self, progress: Callable[[float], None]) -> tuple[Combination, ...]:
         combinations, found, wrong = [], list[Problem](), 0
-        for index in itertools.product(*map(range, self.shape)):
+        count = math.prod(self.shape)
+        needed, free = COMBINATION_BYTES * count, free_memory()
+        if needed > free:
+            message = (
+                f"has {count} combinations, which take about {needed / 2**30:.3g} GiB of memory, "
+                f"and {free / 2**30:.3g} GiB are free; sweep them in parts"
+            )
+            raise ConfigError([Problem(self._source, "sweep", message)])
+        for number, index in enumerate(itertools.product(*map(range, self.shape))):
+            if number % STEP == 0:
+                progress(number / count)
             values = {
                 key: value
-                for axis, number in zip(self.axes, index, strict=True)
-                for key, value in zip(axis.keys, axis.rows[number], strict=True)
+                for axis, at in zip(self.axes, index, strict=True)
+                for key, value in zip(axis.keys, axis.rows[at], strict=True)
             }
             changes = {**values, "run.realizations": 1}
             changes.pop(DIRECTION, None)
@@ -107,7 +128,7 @@ class Plan:
                 continue
             combinations.append(Combination(index, values, config))
         if wrong > MAX_REPORTED:
-            message = f"{wrong} of {math.prod(self.shape)} combinations are wrong"
+            message = f"{wrong} of {count} combinations are wrong"
             found.append(Problem(self._source, "sweep", message))
         if self.sweep.continue_ is not None and not found:
             found += unchained(combinations, self.sweep.continue_, self._source)

@@ -274,12 +274,11 @@ def quantity(
     negative: bool = True,
 ) -> float:
     """The value of an option that is a quantity, in SI."""
-    from mesoslip.configuration.units import is_number, to_si
+    from mesoslip.configuration.units import text_to_si
     from mesoslip.errors import ConfigError, Problem
 
     try:
-        # A plain number is in SI.
-        value = to_si(float(text) if is_number(text) else text, unit, example)
+        value = text_to_si(text, unit, example)
     except ValueError as error:
         raise ConfigError([Problem("", option, str(error), text)]) from None
     if positive and value <= 0:

@@ -127,7 +127,7 @@ def run(
                 ) from error
             raise
         if not quiet:
-            _report_results(results, checked, path)
+            _report_results(results, checked, path, stop)
         files.remove_partial(_partial(path))
         checkpoint.remove()
 
@@ -157,8 +157,7 @@ def _keep(results: Results, path: Path, stop: Stop, checkpoint: Checkpoint) -> i
     return stop.exit_status
 
 
-def _report_results(results: Results, config: Config, path: Path) -> None:
-    from mesoslip.analysis import regime
+def _report_results(results: Results, config: Config, path: Path, stop: Stop) -> None:
     from mesoslip.output import layout
     from mesoslip.simulation.realization import ENDINGS
 
@@ -176,7 +175,7 @@ def _report_results(results: Results, config: Config, path: Path) -> None:
     if config.drive.is_force:
         say(f"{path}: {_mean_velocity(results, config)}")
     else:
-        say(f"{path}: {regime.summary(list(regime.regimes_of_results(results)))}")
+        say(f"{path}: {_regimes(results, path, stop)}")
     if known["break_count"] == 0:
         say(f"{path}: no contact broke: the drive did not move far enough")
     if known["audit"] != "passed":
@@ -194,6 +193,23 @@ def _report_results(results: Results, config: Config, path: Path) -> None:
         say(f"{path}: {config.continued_drive}")
     if known["ending"] != ENDINGS["drive"]:
         say(f"{path}: end of the run: {known['ending']}")
+
+
+def _regimes(results: Results, path: Path, stop: Stop) -> str:
+    """The regimes of all realizations, which may take longer than short runs; after an interrupt,
+    the command that prints them."""
+    from mesoslip.analysis import regime
+
+    found: list[regime.RegimeResult] = []
+    count = len(results.realizations)
+    with progress_shown(count == 1, "regimes") as progress:
+        for one in regime.regimes_of_results(results):
+            if stop.is_set():
+                return f"complete; 'mesoslip regime {path}' prints the regime"
+            found.append(one)
+            if len(found) % max(1, count // 100) == 0:
+                progress(len(found) / count)
+    return regime.summary(found)
 
 
 def _mean_velocity(results: Results, config: Config) -> str:

@@ -60,11 +60,12 @@ def sweep(
     path = output or Path("out") / f"{file.stem}.nc"
     folder = path.with_name(f"{path.stem}.points")
     executor = executor_of(workers, scheduler, pool)
+    # All combinations are checked before anything is written.
+    with progress_shown(quiet, "checking") as progress:
+        plan.check(progress)
     if dry_run:
         _print_estimate(plan, folder, workers)
         return
-    # All combinations are checked before anything is written.
-    _ = plan.combinations
     targets.check_output(path, [file])
     with Store(folder, "points") as store, stopped_by_signals() as stop:
         try:

@@ -118,6 +118,11 @@ def to_si(value: object, unit: str, example: str) -> float:
     return number
 
 
+def text_to_si(text: str, unit: str, example: str) -> float:
+    """A quantity that was typed, as `to_si`: one without a unit is a number in SI."""
+    return to_si(float(text) if is_number(text) else text, unit, example)
+
+
 def _parse(text: str, unit: str, wanted: str) -> float:
     """A string as a number in SI."""
     text = text.strip()

@@ -15,7 +15,7 @@ from mesoslip.configuration.config import Config
 from mesoslip.configuration.files import read_toml
 from mesoslip.configuration.messages import problems
 from mesoslip.configuration.table import Table, Text, Whole, problem
-from mesoslip.configuration.units import is_number, number_of, to_si
+from mesoslip.configuration.units import is_number, number_of, text_to_si, to_si
 from mesoslip.errors import ConfigError, Problem, shown
 
 
@@ -221,7 +221,7 @@ class TraceDescription(Table):
             return None
         for unit in UNITS[name]:
             try:
-                return to_si(text if not is_number(text) else float(text), unit, "")
+                return text_to_si(text, unit, "")
             except ValueError:
                 continue
         raise AssertionError(name)

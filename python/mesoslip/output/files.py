@@ -15,7 +15,7 @@ from mesoslip.configuration.reading import is_directory
 from mesoslip.errors import FileError
 from mesoslip.output.arrays import Arrays, Tree, arrays_of
 from mesoslip.output.file_locks import lock_held
-from mesoslip.output.hdf5 import LOCK, check_links
+from mesoslip.output.hdf5 import LOCK, check_links, check_name
 from mesoslip.output.kinds import KINDS
 from mesoslip.output.old_names import renamed
 from mesoslip.output.validity import check_output, check_signature
@@ -76,6 +76,7 @@ def _opened(path: str | Path, build: Callable[[netCDF4.Dataset], T]) -> Iterator
     if is_directory(path):
         raise FileError(f"{path}: is a directory, not an output file")
     check_signature(path)
+    check_name(path)
     with ExitStack() as stack:
         try:
             check_links(path)

@@ -1,15 +1,60 @@
-"""HDF5 below netCDF-4: a lock for its library, and a check that files are self-contained."""
+"""HDF5 below netCDF-4: a lock for its library, and checks that files are self-contained and end."""
 
 from __future__ import annotations
 
+import os
+import struct
 import threading
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from mesoslip.errors import FileError
 
 # The library is not thread-safe: this lock is held while a file is opened, read, written or closed.
 LOCK = threading.RLock()
+
+# Start of a heap, which has strings of any length and references, with the version.
+HEAP = b"GCOL\x01\0\0\0"
+# Bytes at both ends of a file in which heaps are checked.
+CHECKED_BYTES = 2**23
+
+
+def check_name(path: Path) -> None:
+    """Refuse a name that netCDF's library does not take."""
+    try:
+        str(path).encode()
+    except UnicodeEncodeError:
+        raise FileError(f"{path}: the name of an output must be UTF-8 for netCDF") from None
+
+
+def check_heaps(file: IO[bytes]) -> None:
+    """Refuse a file with a damaged heap, the part without checksums that the library may read
+    endlessly; an `OSError`, as the library raises for other damages."""
+    size = file.seek(0, os.SEEK_END)
+    for start in {0, max(0, size - CHECKED_BYTES)}:
+        file.seek(start)
+        data = file.read(CHECKED_BYTES)
+        at = data.find(HEAP)
+        while at >= 0:
+            _check_heap(data, at)
+            at = data.find(HEAP, at + 1)
+    file.seek(0)
+
+
+def _check_heap(data: bytes, start: int) -> None:
+    """Follow the objects of a heap, as far as the data reach.
+
+    Each has a header of 16 bytes with its number and size. The size of free space, number 0,
+    includes its header; objects take multiples of 8 bytes.
+    """
+    at = start + 16
+    end = start + int.from_bytes(data[start + 8 : at], "little")
+    while at + 16 <= min(end, len(data)):
+        number, size = struct.unpack_from("<H6xQ", data, at)
+        step = 16 + -(-size // 8) * 8 if number else size
+        if not 0 < step <= end - at:
+            raise OSError("a heap is damaged")
+        at += step
 
 
 def check_links(path: Path) -> None:
@@ -19,6 +64,8 @@ def check_links(path: Path) -> None:
     """
     import h5py
 
+    with path.open("rb") as source:
+        check_heaps(source)
     with LOCK, h5py.File(path, "r") as file:
         root = file.id
         seen = {h5py.h5o.get_info(root).addr}

@@ -21,6 +21,7 @@ from typing import NamedTuple
 from mesoslip.configuration.reading import is_directory
 from mesoslip.errors import FileError, WriteError
 from mesoslip.output.file_locks import NO_LOCKS, refused_lock
+from mesoslip.output.hdf5 import check_name
 
 # Endings of files other than outputs.
 OTHER_KINDS = {".csv", ".txt", ".png", ".pdf", ".svg", ".html", ".json"}
@@ -46,6 +47,7 @@ def check_output(path: Path | None, reads: Iterable[str | Path] = ()) -> None:
             f"{path}: an output is netCDF, and its name must not end in {path.suffix}; "
             f"use {path.with_suffix('.nc')}"
         )
+    check_name(path)
     _check(path, reads, is_output=True)
 
 
@@ -109,7 +111,9 @@ def _not_written(path: Path, target: Path, error: Exception) -> FileError:
     is_full = getattr(error, "errno", None) in {errno.ENOSPC, errno.EDQUOT}
     # HDF5 reports a full disk as an error of its own, or as a lack of permission.
     with suppress(OSError):
-        is_full = is_full or shutil.disk_usage(target.parent).free < PROBE_BYTES
+        disk = shutil.disk_usage(target.parent)
+        # A file system of the kernel, as /proc, has no disk.
+        is_full = is_full or disk.free < PROBE_BYTES <= PROBE_BYTES * disk.total
     if is_full:
         return WriteError(f"{path}: cannot be written: no space left on the disk")
     if "HDF" in str(error):

@@ -8,9 +8,11 @@ import operator
 import string
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
+from pathlib import Path
 
 import matplotlib as mpl
 from matplotlib.axes import Axes
+from matplotlib.backend_bases import FigureCanvasBase
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.ticker import MaxNLocator
 
@@ -144,6 +146,8 @@ def plot(
             raise ConfigError([Problem("", key, f"must be {kind} of matplotlib", value)])
     path = None if file is None else as_path(file)
     is_movie = path is not None and path.suffix.lower() in ENDINGS
+    if path is not None and not is_movie:
+        _check_format(path)
     if is_movie and len(outputs) > 1:
         raise FileError(f"{path}: a movie is of one output")
     with ExitStack() as stack, printed(how):
@@ -191,6 +195,16 @@ def _whole(key: str, value: object) -> int | None:
         return None if value is None else operator.index(value)  # type: ignore[arg-type]
     except TypeError:
         raise ConfigError([Problem("", key, "must be a whole number", value)]) from None
+
+
+def _check_format(path: Path) -> None:
+    """Refuse the name of a picture in a format that matplotlib does not write."""
+    formats = [f".{one}" for one in FigureCanvasBase.get_supported_filetypes()]
+    if path.suffix.lower() not in formats:
+        raise FileError(
+            f"{path}: the name of a picture ends in one of {', '.join(formats)}; that of a movie "
+            f"in {' or '.join(ENDINGS)}"
+        )
 
 
 def _finish(figure: Canvas) -> None:

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import matplotlib as mpl
 from matplotlib.figure import Figure, SubFigure
 
-from mesoslip.configuration.units import to_si
+from mesoslip.configuration.units import text_to_si
 from mesoslip.errors import ConfigError, FileError, Problem
 
 INCH = 0.0254
@@ -101,7 +101,7 @@ class Print:
 def width_of(text: str, key: str) -> float:
     """A width of print [m] that is a length."""
     try:
-        return to_si(text, "m", "8.6 cm")
+        return text_to_si(text, "m", "8.6 cm")
     except ValueError as error:
         message = f"{error}, or the column of a journal: {', '.join(JOURNALS)}"
         raise ConfigError([Problem("", key, message, text)]) from None

@@ -195,6 +195,9 @@ def regimes_of_results(results: Results) -> Iterator[RegimeResult]:
     slip_index = {name: number for number, name in enumerate(SLIP_COLUMNS)}
     for one in results.realizations:
         rows = one.rows("trace")
+        if len(rows) < 2 * MIN_CYCLES:
+            yield RegimeResult()
+            continue
         scales = Scales.of_config(results.config, one.time)
         stage = scales.stage
         step = _step(len(rows))

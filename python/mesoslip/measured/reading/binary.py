@@ -18,7 +18,7 @@ from mesoslip.errors import FileError, printable
 from mesoslip.measured.headers import meaning_of
 from mesoslip.measured.reading.source import MAX_BYTES
 from mesoslip.measured.reading.table import Table, listed
-from mesoslip.output.hdf5 import LOCK
+from mesoslip.output.hdf5 import LOCK, check_heaps
 
 HDF5 = b"\x89HDF\r\n\x1a\n"
 # Maximum number of arrays in a file, depth of structures, and number of columns of an array.
@@ -274,6 +274,7 @@ def _hdf5(source: IO[bytes]) -> Iterator[Contents]:
     """Data sets of groups, except links, and data in other files."""
     import h5py
 
+    check_heaps(source)
     with h5py.File(source, "r") as file:
         if "program_version" in file.attrs and "configuration" in file.attrs:
             raise FileError("is an output of mesoslip, not a file of a measurement")

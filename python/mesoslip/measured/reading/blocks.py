@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import lzma
+import os
 from collections.abc import Iterator
 from contextlib import nullcontext
 from dataclasses import replace
@@ -12,7 +13,13 @@ from typing import IO, Any
 from mesoslip.errors import FileError
 from mesoslip.measured.reading.binary import binary_blocks
 from mesoslip.measured.reading.file import READERS, read_file
-from mesoslip.measured.reading.source import COMPRESSIONS, NEWLINE, check_file, text_of
+from mesoslip.measured.reading.source import (
+    CHANGED,
+    COMPRESSIONS,
+    NEWLINE,
+    check_file,
+    text_of,
+)
 from mesoslip.measured.reading.table import BadCell, Table
 from mesoslip.measured.reading.text import read_text
 
@@ -46,6 +53,7 @@ def blocks_of(
     unpacked: Any = COMPRESSIONS[name][1] if name else nullcontext
     try:
         with path.open("rb") as file, unpacked(file) as stream:
+            size = os.fstat(file.fileno()).st_size
             for data in _pieces(stream):
                 text = text_of(path, data, "text")
                 table = read_text(path, above + text, decimal=decimal, has_headers=has_headers)
@@ -55,6 +63,8 @@ def blocks_of(
                     above = b"".join(text.splitlines(keepends=True)[: int(table.lines[0])])
                 lines += text.count(NEWLINE)
                 yield table
+            if os.fstat(file.fileno()).st_size != size:
+                raise FileError(f"{path}: {CHANGED}")
     except (EOFError, OSError, lzma.LZMAError) as error:
         raise FileError(f"{path}: cannot be read: {error}") from None
 

@@ -17,6 +17,7 @@ from mesoslip.errors import FileError, shown
 
 # Maximum size of a file, compressed or not [bytes].
 MAX_BYTES = 2**31
+CHANGED = "changed while it was read; copy it when it is complete, and read the copy"
 # Bytes from which the encoding is determined.
 HEAD = 4096
 # Maximum share of null characters in a damaged text.
@@ -56,9 +57,12 @@ def bytes_of(path: Path) -> bytes:
     """The bytes of a file, decompressed."""
     check_file(path)
     try:
-        if path.stat().st_size > MAX_BYTES:
+        size = path.stat().st_size
+        if size > MAX_BYTES:
             raise FileError(f"{path}: is too large; the maximum is {MAX_BYTES / 2**30:.0f} GiB")
         data = path.read_bytes()
+        if len(data) != size:
+            raise FileError(f"{path}: {CHANGED}")
     except OSError as error:
         raise FileError(f"{path}: cannot be read: {error.strerror}") from None
     return _decompressed(path, data)

@@ -81,11 +81,10 @@ def example(name: str, file: PathLike | None = None) -> list[Path]:
             text = text.replace(f'"{base}"', f'"{Path(base).name}"', 1)
         _write_new(target, text.encode())
         written.append(target)
-        if "trace" in tables:
-            data = tables["trace"]["file"]
-            beside = target.with_name(data)
-            if not is_file(beside):
-                _write_new(beside, (source.parent / data).read_bytes())
+        for data in sorted(source.parent.glob(f"{source.stem}.*")):
+            beside = target.with_name(data.name)
+            if data.suffix != ENDING and not is_file(beside):
+                _write_new(beside, data.read_bytes())
                 written.append(beside)
         source = None if base is None else source.parent / base
         if source is not None:

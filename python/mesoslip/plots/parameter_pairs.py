@@ -73,5 +73,5 @@ def draw_pairs(figure: Canvas, place: object, tree: xr.DataTree) -> None:
 def _formatter() -> ScalarFormatter:
     """Labels of ticks with whole numbers, not differences from an offset."""
     formatter = ScalarFormatter(useOffset=False)
-    formatter.set_powerlimits((-3, 5))
+    formatter.set_powerlimits((-4, 5))
     return formatter

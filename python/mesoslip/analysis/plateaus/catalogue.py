@@ -54,7 +54,7 @@ HEADS = {
     "normal_force": ("normal force", "N"),
     "mean_friction": ("mean friction", "N"),
     "mean_friction_coefficient": ("coefficient", "1"),
-    "hersey_number": ("viscosity x speed / load", "1/m"),
+    "hersey_number": ("viscosity × speed/load", "1/m"),
 }
 # Signals of the machine, whose steps make plateaus; their names are those of variables.
 SPEEDS = ("sliding_speed", "rotation_speed")

@@ -59,6 +59,12 @@ def example(name: str, file: PathLike | None = None) -> list[Path]:
         If there is no such example.
     FileError
         If the file exists, or cannot be written.
+
+    Examples
+    --------
+    >>> import mesoslip
+    >>> [path.name for path in mesoslip.example("sweeps/delay-stiffness")]
+    ['delay-stiffness.toml', 'klein.toml']
     """
     known = examples()
     if not isinstance(name, str) or name not in known:

@@ -7,6 +7,7 @@ parts of a file. Of a block after ``not run: reason`` commands are parsed, and n
 
 from __future__ import annotations
 
+import doctest
 import json
 import re
 import shlex
@@ -502,6 +503,23 @@ def test_every_function_is_on_a_page_of_the_reference():
     names = {name.rpartition(".")[2] for name in found}
     assert {*mesoslip.__all__} <= names
     assert names <= {*listed, "MesoslipError", "ConfigError", "FileError", "RunError"}
+
+
+# Public names without an example: what others return or take, and errors.
+NO_EXAMPLE = {"Cycle", "Dask", "Processes", "Threads"}
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    "name",
+    [name for name in mesoslip.__all__ if name not in NO_EXAMPLE and not name.endswith("Error")],
+)
+def test_the_example_of_a_docstring_runs(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("MPLBACKEND", "agg")
+    (found,) = doctest.DocTestFinder(recurse=False).find(getattr(mesoslip, name), name)
+    assert found.examples
+    assert doctest.DocTestRunner().run(found).failed == 0
 
 
 def test_metadata_agree():

@@ -225,6 +225,11 @@ def _column(data: xr.Dataset | Arrays, name: str) -> Column:
 def slips(output: OutputLike) -> xr.Dataset:
     """The catalogue of slips of an output, dimension ``slip``, in SI.
 
+    Parameters
+    ----------
+    output
+        Output of a run, or a measured trace.
+
     Returns
     -------
     xarray.Dataset
@@ -239,6 +244,16 @@ def slips(output: OutputLike) -> xr.Dataset:
     ------
     FileError
         If the output cannot be read, or is not of a run.
+
+    Examples
+    --------
+    >>> import mesoslip
+    >>> path, *_ = mesoslip.example("klein")  # writes klein.toml
+    >>> slips = mesoslip.slips(mesoslip.run(mesoslip.Config.load(path, ["contacts.count=200"])))
+    >>> slips["force_drop"].attrs["units"], bool(slips["waiting_time"].isnull()[0])
+    ('N', True)
+    >>> float(slips["duration"][0]) < 0.02  # s
+    True
     """
     import xarray as xr
 

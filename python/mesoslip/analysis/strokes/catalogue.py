@@ -280,11 +280,11 @@ def strokes(
         Group ``strokes``, dimension ``stroke``: times, ``direction`` (+1 or -1), ``length``,
         ``velocity``, ``mean_friction`` along the motion with its standard error, which includes
         the correlation of samples, the coefficient where the normal force is known,
-        ``max_friction`` and its distance from the reversal, the forces at the reversals, and the ``stiffness`` of
-        the reversal. Group ``cycles``, dimension ``cycle``: ``loop_energy``, ``offset`` (half the
-        sum of the mean forces in both directions), and means. SI; of a measured friction
-        coefficient forces have the unit 1. Attributes: ``source``, the quantity in which strokes
-        were found, and ``notes``.
+        ``max_friction`` and its distance from the reversal, the forces at the reversals, and the
+        ``stiffness`` of the reversal. Group ``cycles``, dimension ``cycle``: ``loop_energy``,
+        ``offset`` (half the sum of the mean forces in both directions), and means. SI; of a
+        measured friction coefficient forces have the unit 1. Attributes: ``source``, the quantity
+        in which strokes were found, and ``notes``.
 
     Raises
     ------

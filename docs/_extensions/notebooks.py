@@ -17,17 +17,6 @@ PAGES = {
     "fit": "tutorial-fit.md",
     "own-analysis": "how-to/read-an-output.md",
 }
-# The first cell: files that pages name, and for a page on an output the output.
-FILES = """\
-# The runs that the package includes, in the folder runs.
-import shutil
-from importlib.resources import files
-
-shutil.copytree(files("mesoslip") / "runs", "runs", dirs_exist_ok=True)"""
-OUTPUT = """\
-!cp -n runs/klein.toml .
-!mesoslip run klein.toml --quiet"""
-
 BLOCK = re.compile(r"^```(\w*)\n(.*?)^```\n", re.MULTILINE | re.DOTALL)
 COMMENT = re.compile(r"^<!--.*?-->\n", re.MULTILINE | re.DOTALL)
 LEFT_OUT = re.compile(r"<!-- not run: [^\n]*-->\n\Z")
@@ -41,9 +30,7 @@ ENDLESS = {"explore"}
 def notebook(page: Path) -> dict[str, Any]:
     """A page as a notebook of format 4."""
     text = page.read_text(encoding="utf-8")
-    cells = [_code(FILES)]
-    if "mesoslip example klein" not in text and "out/klein.nc" in text:
-        cells.append(_code(OUTPUT))
+    cells: list[dict[str, Any]] = []
     place = 0
     for match in BLOCK.finditer(text):
         before, code = text[place : match.start()], _cell(*match.groups())

@@ -48,6 +48,16 @@ def run(
         If the configuration cannot be read or is wrong.
     RunError
         If the run fails.
+
+    Examples
+    --------
+    >>> import mesoslip
+    >>> path, *_ = mesoslip.example("klein")  # writes klein.toml
+    >>> tree = mesoslip.run(mesoslip.Config.load(path, ["contacts.count=200"]))
+    >>> tree["spring_force"].dims, tree["spring_force"].attrs["units"]
+    (('realization', 'time'), 'N')
+    >>> tree["slips"]["force_drop"].dims
+    ('slip',)
     """
     checked = as_config(config)
     results = run_realizations(checked, executor=executor, progress=progress)

@@ -59,6 +59,12 @@ def example(name: str, file: PathLike | None = None) -> list[Path]:
         If there is no such example.
     FileError
         If the file exists, or cannot be written.
+
+    Examples
+    --------
+    >>> import mesoslip
+    >>> [path.name for path in mesoslip.example("sweeps/delay-stiffness")]
+    ['delay-stiffness.toml', 'klein.toml']
     """
     known = examples()
     if not isinstance(name, str) or name not in known:
@@ -81,11 +87,10 @@ def example(name: str, file: PathLike | None = None) -> list[Path]:
             text = text.replace(f'"{base}"', f'"{Path(base).name}"', 1)
         _write_new(target, text.encode())
         written.append(target)
-        if "trace" in tables:
-            data = tables["trace"]["file"]
-            beside = target.with_name(data)
-            if not is_file(beside):
-                _write_new(beside, (source.parent / data).read_bytes())
+        for data in sorted(source.parent.glob(f"{source.stem}.*")):
+            beside = target.with_name(data.name)
+            if data.suffix != ENDING and not is_file(beside):
+                _write_new(beside, data.read_bytes())
                 written.append(beside)
         source = None if base is None else source.parent / base
         if source is not None:

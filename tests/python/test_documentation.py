@@ -1,12 +1,13 @@
 """What README and documentation tell to type is typed: Python, TOML, and commands, page by page.
 
-Blocks are gone through as a reader does, in a folder of their own. A TOML block whose first line
-is a comment with a file's name is that file. Of a block after ``not run: reason`` commands are
-parsed, and no more is done.
+Blocks are gone through as a reader does, in an empty folder (README: in a clone, which has
+``runs``). A TOML block whose first line is a comment with a file's name is that file; others are
+parts of a file. Of a block after ``not run: reason`` commands are parsed, and no more is done.
 """
 
 from __future__ import annotations
 
+import doctest
 import json
 import re
 import shlex
@@ -45,6 +46,7 @@ PAGES = [
 ]
 # Pages whose runs take some seconds: `make docs` runs them.
 LONG_PAGES = [
+    "ageing.md",
     "campaigns.md",
     "cycles.md",
     "how-to/avalanches.md",
@@ -57,17 +59,16 @@ LONG_PAGES = [
     "how-to/which-motion.md",
     "questions.md",
     "teaching.md",
+    "temperature.md",
     "tutorial-fit.md",
     "tutorial.md",
 ]
 
-# Those that are run without being made shorter too.
+# Those that are run without being made shorter too, as they have numbers to compare.
 AS_THEY_STAND = [
-    "how-to/measured-surface.md",
-    "how-to/slide-hold-slide.md",
-    "questions.md",
-    "teaching.md",
-    "tutorial-fit.md",
+    name
+    for name in LONG_PAGES
+    if re.search("^<!-- (numbers|printed)", (DOCS / name).read_text(encoding="utf-8"), re.MULTILINE)
 ]
 
 FENCE = re.compile(r"^(?P<fence>`{3,}|:{3,})(?P<language>\S*).*$")
@@ -135,9 +136,10 @@ class Block:
 
 
 def with_long_ones(pages):
-    """Pages, of which the long ones are left to `make docs`."""
+    """Pages, of which the long ones are left to `make docs`, but for those run as they stand."""
     long_pages = {DOCS / name for name in LONG_PAGES}
-    return [long(page) if page in long_pages else page for page in pages]
+    chosen = [page for page in pages if page not in {DOCS / name for name in AS_THEY_STAND}]
+    return [long(page) if page in long_pages else page for page in chosen]
 
 
 def blocks_of(page):
@@ -180,29 +182,22 @@ def make_shorter(path):
     path.write_text(text)
 
 
-@pytest.fixture(scope="module")
-def shortened(tmp_path_factory):
-    """A clone's runs, made short."""
-    folder = tmp_path_factory.mktemp("pages") / "runs"
-    shutil.copytree(ROOT / "runs", folder, ignore=shutil.ignore_patterns("*.py", "__pycache__"))
-    for path in folder.rglob("*.toml"):
-        make_shorter(path)
-    return folder
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """An empty folder, as a reader has it."""
+    path = tmp_path / "folder"
+    path.mkdir()
+    monkeypatch.chdir(path)
+    monkeypatch.setenv("MPLBACKEND", "agg")
+    monkeypatch.setattr(mesoslip, "fit", fit_of_a_page)
+    return path
 
 
 @pytest.fixture
-def workshop(shortened, tmp_path, monkeypatch):
-    """A folder as a reader has it: a clone's runs, an example, an output of it, a table."""
-    shutil.copytree(shortened, tmp_path / "runs")
-    shutil.copy(shortened / "klein.toml", tmp_path)
-    for name in ("paper-k1002-v42", "basalt-step"):
-        for path in (ROOT / "runs" / "measured").glob(f"{name}.*"):
-            shutil.copy(path, tmp_path)
+def parts(tmp_path):
+    """A folder for parts of files, with what they are laid over."""
+    shutil.copy(ROOT / "runs" / "klein.toml", tmp_path)
     (tmp_path / "stage.csv").write_text(HISTORY)
-    (tmp_path / "out").mkdir()
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("MPLBACKEND", "agg")
-    monkeypatch.setattr(mesoslip, "fit", fit_of_a_page)
     return tmp_path
 
 
@@ -213,20 +208,15 @@ def fit_of_a_page(trace, config):
     return mesoslip.open_output("out/experiment.posterior.nc")
 
 
-def check_toml(block, workshop):
+def check_toml(block, folder, parts):
     """Check a file, or a part of one laid over Klein's case."""
     tables = tomllib.loads(block.text)
     named = FILE.match(block.text)
-    path = workshop / (named["path"] if named else "part.toml")
-    path.parent.mkdir(parents=True, exist_ok=True)
-    if "base" not in tables:
-        path.write_text('base = "klein.toml"\n' + block.text)
-    else:
-        path.write_text(block.text)
-        if not (path.parent / tables["base"]).exists():
-            # Told of another folder than that of the block.
-            path = workshop / "runs" / "sweeps" / "part.toml"
-            path.write_text(block.text)
+    path = folder / named["path"] if named else parts / "part.toml"
+    # README has a part of a file in a folder of a clone.
+    base = 'base = "klein.toml"\n'
+    text = re.sub(r'^base = ".*klein.toml"', base.strip(), block.text, flags=re.MULTILINE)
+    path.write_text(text if named or "base" in tables else base + text)
     make_shorter(path)
     if "sweep" in tables:
         assert Plan.load(path).combinations
@@ -250,18 +240,14 @@ def run_command(words, comment, command):
     is_placeholder = any(PLACEHOLDER.search(one) for one in arguments)
     if name in PARSED_ONLY or is_placeholder or any(one.endswith(MOVIES) for one in arguments):
         return ""
-    if name == "example":
-        Path(f"{Path(arguments[-1]).name}.toml").unlink(missing_ok=True)
     expected = STATUS.search(comment)
     status, out, err = command(name, *arguments)
     assert status == (int(expected[1]) if expected else 0), f"{shlex.join(words)}\n{out}{err}"
+    if name == "example":
+        for path in map(Path, err.split()):
+            if path.suffix == ".toml":
+                make_shorter(path)
     return out + err
-
-
-def needs_output(page):
-    """Whether a page speaks of the output of the first example without making it."""
-    text = page.read_text(encoding="utf-8")
-    return "out/klein.nc" in text
 
 
 def name_of(page):
@@ -271,40 +257,33 @@ def name_of(page):
 
 @pytest.mark.usefixtures("few_replicas", "quick_pictures")
 @pytest.mark.parametrize("page", with_long_ones(PAGES), ids=name_of)
-def test_a_page_with_short_runs(page, workshop, command):
-    type_page(page, workshop, command)
+def test_a_page_with_short_runs(page, folder, parts, command):
+    if page == ROOT / "README.md":
+        shutil.copytree(ROOT / "runs", folder / "runs")
+        for path in folder.rglob("*.toml"):
+            make_shorter(path)
+    type_page(page, folder, parts, command)
 
 
 @pytest.mark.parametrize("name", LONG_PAGES)
-def test_a_long_page_is_right_as_far_as_that_is_seen_without_runs(name, workshop, command):
-    type_page(DOCS / name, workshop, command, is_run=False)
+def test_a_long_page_is_right_as_far_as_that_is_seen_without_runs(name, folder, parts, command):
+    type_page(DOCS / name, folder, parts, command, is_run=False)
 
 
 @pytest.mark.long
 @pytest.mark.timeout(0)
 @pytest.mark.parametrize("name", AS_THEY_STAND)
-def test_a_page_as_it_stands(name, workshop, command, monkeypatch):
+def test_a_page_as_it_stands(name, folder, parts, command, monkeypatch):
     """Those whose runs are made shorter for the test above, with the numbers on them."""
-    for path in (ROOT / "runs").rglob("*.toml"):
-        shutil.copy(path, workshop / path.relative_to(ROOT))
-    shutil.copy(ROOT / "runs" / "klein.toml", workshop)
     monkeypatch.setattr(sys.modules[__name__], "SHORTER", {})
-    type_page(DOCS / name, workshop, command)
+    type_page(DOCS / name, folder, parts, command)
 
 
-def type_page(page, workshop, command, *, is_run=True):
-    """Type what a page has in its blocks, or only check its files and the arguments of commands.
-
-    Numbers are compared if the page's runs are not made shorter.
-    """
+def type_page(page, folder, parts, command, *, is_run=True):
+    """Type what a page has in its blocks, or only check its files and the arguments of commands."""
     blocks = blocks_of(page)
-    if is_run and needs_output(page):
-        assert command("run", "klein.toml", "--quiet")[0] == 0
     names = {"__name__": "page", "mesoslip": mesoslip, "np": np}
-    printed, is_compared = (
-        "",
-        is_run and (not SHORTER or page not in map(DOCS.joinpath, LONG_PAGES)),
-    )
+    printed = ""
     for block in blocks:
         place = f"{page.relative_to(ROOT)}, line {block.line}"
         is_shell = block.language in {"", "sh", "bash", "console"}
@@ -312,11 +291,11 @@ def type_page(page, workshop, command, *, is_run=True):
             continue
         try:
             if block.language == "toml":
-                check_toml(block, workshop)
+                check_toml(block, folder, parts)
             elif block.language == "python" and is_run:
                 exec(compile(block.text, place, "exec"), names)
                 plt.close("all")
-            elif block.language == NUMBERS and is_compared:
+            elif block.language == NUMBERS and is_run:
                 text = page.read_text(encoding="utf-8")
                 wrong = page_numbers.wrong_numbers(block.text, text, names)
                 assert not wrong, "\n".join(wrong)
@@ -324,11 +303,12 @@ def type_page(page, workshop, command, *, is_run=True):
                 for words, comment in commands_of(block.text):
                     if words[0] == "mesoslip":
                         parse_command(words)
-                        if is_run and not block.is_left_out:
+                        # Without runs, files that others are based on are written all the same.
+                        if not block.is_left_out and (is_run or words[1] == "example"):
                             printed += run_command(words, comment, command)
                     elif words[0] == "make":
                         check_targets(words[1:])
-            if block.printed_share is not None and is_compared:
+            if block.printed_share is not None and is_run:
                 wrong = page_numbers.not_printed(block.text, printed, block.printed_share)
                 assert not wrong, "\n".join(wrong)
         except Exception as error:
@@ -372,7 +352,7 @@ def test_lists_of_names_are_complete(page, passage, form, names):
     assert not missing, f"{page} does not list {missing}"
 
 
-@pytest.mark.usefixtures("workshop")
+@pytest.mark.usefixtures("folder")
 def test_sentences_that_a_page_quotes_are_printed(command):
     """Quotations of the page on motions are what the commands above them print."""
     text = (DOCS / "how-to" / "which-motion.md").read_text(encoding="utf-8")
@@ -381,6 +361,7 @@ def test_sentences_that_a_page_quotes_are_printed(command):
     (table,) = re.findall(r"^```text\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
     sentences.append(table)
     assert len(sentences) == 2
+    mesoslip.example("klein")
     printed = "".join(command(name, "klein.toml")[1] for name in ("info", "curve"))
     for sentence in sentences:
         assert sentence in printed
@@ -522,6 +503,23 @@ def test_every_function_is_on_a_page_of_the_reference():
     names = {name.rpartition(".")[2] for name in found}
     assert {*mesoslip.__all__} <= names
     assert names <= {*listed, "MesoslipError", "ConfigError", "FileError", "RunError"}
+
+
+# Public names without an example: what others return or take, and errors.
+NO_EXAMPLE = {"Cycle", "Dask", "Processes", "Threads"}
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    "name",
+    [name for name in mesoslip.__all__ if name not in NO_EXAMPLE and not name.endswith("Error")],
+)
+def test_the_example_of_a_docstring_runs(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("MPLBACKEND", "agg")
+    (found,) = doctest.DocTestFinder(recurse=False).find(getattr(mesoslip, name), name)
+    assert found.examples
+    assert doctest.DocTestRunner().run(found).failed == 0
 
 
 def test_metadata_agree():

@@ -201,5 +201,5 @@ def test_command_tables_and_picture(disc, command, tmp_path):
     assert len(lines) == 6
     assert lines == (tmp_path / "b.csv").read_text().splitlines()
     figure = mesoslip.plot(path, view="stribeck")
-    assert figure.axes[1].get_xlabel() == "viscosity x speed / load (1/m)"
+    assert figure.axes[1].get_xlabel() == "viscosity × speed/load (1/m)"
     assert figure.axes[1].get_xscale() == "log"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import doctest
 import gc
 import time
 from contextlib import suppress
@@ -125,13 +124,6 @@ def test_counts_of_the_master_equation_are_real():
 def test_tables_without_named_columns_are_errors(whole, name):
     with pytest.raises(RunError, match="there are 'trace', "):
         whole.records(name)
-
-
-def test_the_example_of_its_documentation_runs(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    finder = doctest.DocTestFinder(recurse=False)
-    (example,) = finder.find(Realization, "Realization")
-    assert doctest.DocTestRunner().run(example).failed == 0
 
 
 @pytest.mark.parametrize("kind", list(KINDS))

@@ -35,6 +35,7 @@ def held_peaks(growth: float, width: float, engine: str) -> tuple[Config, Array]
             f"run.engine={engine}",
             f"contacts.ageing.growth={growth}",
             f"contacts.threshold.relative_width={width}",
+            "contacts.thermal=none",
             "contacts.count=50000",
             "run.realizations=1",
             "output.interval=50 ms",

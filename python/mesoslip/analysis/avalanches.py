@@ -110,6 +110,15 @@ def avalanches(
     ------
     FileError
         If the output cannot be read, or has no avalanches.
+
+    Examples
+    --------
+    >>> import mesoslip
+    >>> path, *_ = mesoslip.example("bundle")  # writes bundle.toml
+    >>> tree = mesoslip.run(mesoslip.Config.load(path, ["contacts.count=2000"]))
+    >>> near_failure = mesoslip.avalanches(tree, min_force_ratio=0.99)
+    >>> 0 < near_failure.sizes["avalanche"] < mesoslip.avalanches(tree).sizes["avalanche"]
+    True
     """
     tree = as_run(output)
     if "avalanches" not in tree.children:
@@ -158,6 +167,14 @@ def avalanche_summary(
     ------
     FileError
         If the output cannot be read, or has no avalanches.
+
+    Examples
+    --------
+    >>> import mesoslip
+    >>> path, *_ = mesoslip.example("bundle")  # writes bundle.toml
+    >>> tree = mesoslip.run(mesoslip.Config.load(path, ["contacts.count=20000"]))
+    >>> 2 < mesoslip.avalanche_summary(tree)["exponent"] < 3  # 5/2 for large bursts
+    True
     """
     tree = as_run(output)
     data = avalanches(tree, after=after, min_force_ratio=min_force_ratio)

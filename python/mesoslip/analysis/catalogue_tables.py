@@ -64,6 +64,13 @@ def write_table(data: xr.Dataset | xr.DataTree, file: PathLike) -> None:
     ------
     FileError
         If the data are of another kind, or the file cannot be written.
+
+    Examples
+    --------
+    >>> import mesoslip
+    >>> path, *_ = mesoslip.example("klein")  # writes klein.toml
+    >>> tree = mesoslip.run(mesoslip.Config.load(path, ["contacts.count=200", "run.duration=4 s"]))
+    >>> mesoslip.write_table(mesoslip.slips(tree), "slips.csv")
     """
     path = as_path(file)
     known = BY_GROUP if isinstance(data, xr.DataTree) else BY_DIMENSION

@@ -45,6 +45,13 @@ def export(output: OutputLike, file: PathLike) -> None:
     FileError
         If the output cannot be read, the package of the format is not installed, or the file
         cannot be written.
+
+    Examples
+    --------
+    >>> import mesoslip
+    >>> path, *_ = mesoslip.example("klein")  # writes klein.toml
+    >>> tree = mesoslip.run(mesoslip.Config.load(path, ["contacts.count=200"]))
+    >>> mesoslip.export(tree, "klein.zarr")  # doctest: +SKIP
     """
     path = as_path(file)
     write = FORMATS.get(path.suffix.lower())

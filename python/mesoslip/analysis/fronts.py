@@ -356,6 +356,14 @@ def fronts(output: OutputLike) -> DataTree:
     ------
     FileError
         If the output cannot be read, or is not of such a slider.
+
+    Examples
+    --------
+    >>> import mesoslip
+    >>> path, *_ = mesoslip.example("front-types")  # writes front-types.toml
+    >>> found = mesoslip.fronts(mesoslip.run(path))
+    >>> round(float(found["fronts"]["speed_ratio"][0]), 2)
+    1.12
     """
     import xarray as xr
 

@@ -213,6 +213,16 @@ def lyapunov(
         If the slider has no inertia or no spring, or there are fewer than two twins.
     RunError
         If the run fails, or is too short.
+
+    Examples
+    --------
+    >>> import mesoslip
+    >>> path, *_ = mesoslip.example("klein")  # writes klein.toml
+    >>> config = mesoslip.Config.load(path, ["run.engine=me", "run.resolution=1"])
+    >>> config = config.replace("run.duration=2 s", "drive.velocity=2 um/s")
+    >>> found = mesoslip.lyapunov(config, twins=4)
+    >>> found["distance"].dims
+    ('twin', 'window')
     """
     import xarray as xr
 

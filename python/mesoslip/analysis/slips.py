@@ -216,6 +216,11 @@ def _column(data: Dataset | Arrays, name: str) -> Column:
 def slips(output: OutputLike) -> Dataset:
     """The catalogue of slips of an output, dimension ``slip``, in SI.
 
+    Parameters
+    ----------
+    output
+        Output of a run, or a measured trace.
+
     Returns
     -------
     xarray.Dataset
@@ -230,6 +235,16 @@ def slips(output: OutputLike) -> Dataset:
     ------
     FileError
         If the output cannot be read, or is not of a run.
+
+    Examples
+    --------
+    >>> import mesoslip
+    >>> path, *_ = mesoslip.example("klein")  # writes klein.toml
+    >>> slips = mesoslip.slips(mesoslip.run(mesoslip.Config.load(path, ["contacts.count=200"])))
+    >>> slips["force_drop"].attrs["units"], bool(slips["waiting_time"].isnull()[0])
+    ('N', True)
+    >>> float(slips["duration"][0]) < 0.02  # s
+    True
     """
     import xarray as xr
 

@@ -293,6 +293,15 @@ def mean_field(config: ConfigLike, *, progress: Callable[[float], None] | None =
         If the configuration is wrong, or has no interaction.
     RunError
         If a cascade of contacts does not end, or there are too few lives for a table.
+
+    Examples
+    --------
+    >>> import mesoslip
+    >>> path, *_ = mesoslip.example("avalanche")  # writes avalanche.toml
+    >>> changes = ["contacts.count=100", "interaction.columns=10", "interaction.rows=10"]
+    >>> config = mesoslip.Config.load(path, [*changes, "interaction.strength=0.1"])
+    >>> mesoslip.mean_field(config).config("steady").run.engine
+    'me'
     """
     checked = as_config(config)
     if not checked.contact_kind.on_lattice:

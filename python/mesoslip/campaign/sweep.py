@@ -281,6 +281,16 @@ def sweep(
         If the sweep cannot be read, or it or one of its combinations is wrong.
     RunError
         If the scheduler is lost, or workers cannot be started.
+
+    Examples
+    --------
+    >>> import mesoslip
+    >>> path, *_ = mesoslip.example("klein")  # writes klein.toml
+    >>> grid = {"slider.stiffness": ["100 N/m", "400 N/m"]}
+    >>> plan = {"base": "klein.toml", "contacts": {"count": 200}, "run": {"duration": "3 s"}}
+    >>> data = mesoslip.sweep({**plan, "sweep": {"measures": ["mean_force"], "grid": grid}})
+    >>> dict(data["mean_force"].sizes)
+    {'slider.stiffness': 2, 'realization': 1}
     """
     checked = as_plan(plan)
     kept = None if store is None else Store(as_path(store), "points")

@@ -59,7 +59,21 @@ def _problems_of(source: str) -> Iterator[None]:
 
 
 class Config(Table):
-    """A whole configuration."""
+    """A whole configuration: frozen tables of keys, as attributes, with quantities in SI.
+
+    `load`, `from_dict` and `from_toml` read and check it; `replace` changes keys.
+
+    Examples
+    --------
+    >>> import mesoslip
+    >>> path, *_ = mesoslip.example("klein")  # writes klein.toml
+    >>> config = mesoslip.Config.load(path, ["contacts.delay=1ms"])
+    >>> stiffer = config.replace("slider.stiffness=200 N/m", contacts={"count": 500})
+    >>> stiffer.contacts.delay, stiffer.spring_stiffness  # SI
+    (0.001, 200.0)
+    >>> mesoslip.Config.from_dict(stiffer.to_dict()) == stiffer
+    True
+    """
 
     title: Text | None = None
     """Title of the run, for pictures and reports."""

@@ -40,6 +40,13 @@ class ThresholdLaw:
     Draws at or below ``minimum``, the back force over the mean threshold, are rejected. Mean and
     width are those before rejection. The law "table" has the cells of ``samples``, with ``weights``
     if they differ. Source: model section 2; the gaussian law is Braun's.
+
+    Examples
+    --------
+    >>> import mesoslip
+    >>> law = mesoslip.ThresholdLaw("gaussian", 0.1)
+    >>> round(float(law.quantile(0.5)), 6), round(float(law.survival(1.0)), 6)
+    (1.0, 0.5)
     """
 
     law: str

@@ -41,6 +41,13 @@ def track_strength(
     ------
     ConfigError
         If there is no track.
+
+    Examples
+    --------
+    >>> import mesoslip
+    >>> path, *_ = mesoslip.example("track")  # writes track.toml
+    >>> mesoslip.track_strength(mesoslip.Config.load(path), [0.0, 1e-6, 2e-6]).shape
+    (3,)
     """
     track = config.contacts.needed_track
     x, floor = np.asarray(displacement, dtype=np.float64), config.contacts.strength_floor

@@ -121,6 +121,16 @@ def branches(
         If the configuration is wrong, or cannot be continued in the key.
     RunError
         If a run fails.
+
+    Examples
+    --------
+    >>> import mesoslip
+    >>> path, *_ = mesoslip.example("klein")  # writes klein.toml
+    >>> config = mesoslip.Config.load(path, ["contacts.delay=2ms", "slider.damping_ratio=1"])
+    >>> config = config.replace("contacts.threshold.relative_width=0.1", "run.resolution=1")
+    >>> found = mesoslip.branches(config, "drive.velocity", [3e-6, 40e-6], find_multipliers=False)
+    >>> dict(found["amplitude"].sizes)
+    {'direction': 2, 'drive.velocity': 2}
     """
     base = master_equation(as_config(config))
     _check(key, values)

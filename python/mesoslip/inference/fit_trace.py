@@ -73,6 +73,13 @@ def fit(
         If a trace cannot be fitted, or the configuration is wrong or contradicts the trace.
     RunError
         If no simulation resembles the trace.
+
+    Examples
+    --------
+    >>> import mesoslip
+    >>> written = mesoslip.example("fit/experiment") + mesoslip.example("fit/fit")
+    >>> trace = mesoslip.read_trace("experiment.csv", rate=1e3, velocity=1e-7)
+    >>> posterior = mesoslip.fit(trace, "fit.toml")  # doctest: +SKIP
     """
     outputs = several(output)
     if not outputs:

@@ -83,6 +83,11 @@ def predict(
     ------
     FileError, ConfigError
         If a file is no posterior, or the trace cannot be predicted.
+
+    Examples
+    --------
+    >>> import mesoslip
+    >>> predicted = mesoslip.predict("out/a.posterior.nc", "out/b.nc")  # doctest: +SKIP
     """
     import xarray as xr
 
@@ -240,6 +245,11 @@ def compare_fits(posteriors: Sequence[OutputLike]) -> list[Score]:
     ------
     FileError
         If there are fewer than two, or they are of different traces.
+
+    Examples
+    --------
+    >>> import mesoslip
+    >>> scores = mesoslip.compare_fits(["out/a.nc", "out/b.nc"])  # doctest: +SKIP
     """
     trees = [as_posterior(one) for one in posteriors]
     if len(trees) < 2:

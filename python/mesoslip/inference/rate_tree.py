@@ -117,6 +117,15 @@ def response_posterior(
         If an argument is wrong.
     RunError
         If the motion cannot be integrated.
+
+    Examples
+    --------
+    >>> import mesoslip
+    >>> path, *_ = mesoslip.example("measured/basalt-step")  # writes the file and a description
+    >>> trace = mesoslip.read_trace(path)
+    >>> found = mesoslip.response_posterior(trace, laws=["slip"], samples=400)
+    >>> found["posterior"]["slip_distance"].dims
+    ('chain', 'draw')
     """
     laws = list(dict.fromkeys([laws] if isinstance(laws, str) else laws))
     unknown = [one for one in laws if one not in LAWS]

@@ -248,6 +248,14 @@ def read_trace(
         If the file cannot be read or understood; the message names the line.
     ConfigError
         If the description is wrong, or arguments contradict each other.
+
+    Examples
+    --------
+    >>> import mesoslip
+    >>> path, *_ = mesoslip.example("measured/paper-k1002-v42")  # writes the file and a description
+    >>> tree = mesoslip.read_trace(path, end="200 s")
+    >>> tree["spring_force"].dims, tree["slips"].sizes["slip"] > 3
+    (('realization', 'time'), True)
     """
     return trace_of(
         understand(

@@ -41,10 +41,29 @@ def as_config(config: ConfigLike, overrides: Iterable[str] = ()) -> Config:
 def open_output(path: PathLike) -> DataTree:
     """Read an output of any command into memory.
 
+    Parameters
+    ----------
+    path
+        The netCDF file.
+
+    Returns
+    -------
+    xarray.DataTree
+        The output, as the command in Python returns it.
+
     Raises
     ------
     FileError
         If there is no such file, or it is not an output of mesoslip, or it is damaged.
+
+    Examples
+    --------
+    >>> import mesoslip
+    >>> path, *_ = mesoslip.example("klein")  # writes klein.toml
+    >>> tree = mesoslip.run(mesoslip.Config.load(path, ["contacts.count=200"]))
+    >>> tree.to_netcdf("klein.nc")
+    >>> mesoslip.open_output("klein.nc")["spring_force"].dims
+    ('realization', 'time')
     """
     from mesoslip.output import files
 

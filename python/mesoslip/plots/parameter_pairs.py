@@ -66,5 +66,5 @@ def draw_pairs(figure: Canvas, place: object, tree: DataTree) -> None:
 def _formatter() -> ScalarFormatter:
     """Labels of ticks with whole numbers, not differences from an offset."""
     formatter = ScalarFormatter(useOffset=False)
-    formatter.set_powerlimits((-3, 5))
+    formatter.set_powerlimits((-4, 5))
     return formatter

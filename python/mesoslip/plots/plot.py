@@ -115,6 +115,13 @@ def plot(
     ConfigError
         If there is no such view or horizontal axis, the view does not have one of the options, or
         an option is of a wrong type.
+
+    Examples
+    --------
+    >>> import mesoslip
+    >>> path, *_ = mesoslip.example("klein")  # writes klein.toml
+    >>> tree = mesoslip.run(mesoslip.Config.load(path, ["contacts.count=200", "run.duration=3 s"]))
+    >>> figure = mesoslip.plot(tree, "klein.pdf", width="aps-1", title="")
     """
     outputs = several(output)
     if not outputs:

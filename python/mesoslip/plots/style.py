@@ -90,7 +90,11 @@ def filled(text: str, width: float, max_lines: int | None = None) -> str:
 
 def wrapped(text: str, width: float, max_lines: int | None = None) -> str:
     """A text, which may have symbols such as $v_d$, in lines of a width [inch]."""
-    return textwrap.fill(text, max(20, characters(width)), max_lines=max_lines, placeholder=" …")
+    # A number and its error stay in one line.
+    joined = text.replace(" ± ", "\N{NO-BREAK SPACE}±\N{NO-BREAK SPACE}")
+    room = max(20, characters(width))
+    lines = textwrap.fill(joined, room, max_lines=max_lines, placeholder=" …")
+    return lines.replace("\N{NO-BREAK SPACE}", " ")
 
 
 def characters(width: float) -> int:

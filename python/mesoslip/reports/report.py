@@ -38,6 +38,13 @@ def report(output: OutputLike | Sequence[OutputLike], file: PathLike) -> None:
     FileError
         If an output cannot be read, outputs are of different commands, or the page cannot be
         written.
+
+    Examples
+    --------
+    >>> import mesoslip
+    >>> path, *_ = mesoslip.example("klein")  # writes klein.toml
+    >>> tree = mesoslip.run(mesoslip.Config.load(path, ["contacts.count=200", "run.duration=3 s"]))
+    >>> mesoslip.report(tree, "klein.html")
     """
     path = as_path(file)
     with ExitStack() as stack:

@@ -57,6 +57,11 @@ DENSITY_POINTS, WIDTHS_BELOW = 2001, 6
 def curve(config: ConfigLike) -> DataTree:
     """The force curve F(X) of the master equation, and its elastic instability.
 
+    Parameters
+    ----------
+    config
+        A TOML file, an output, nested tables, or a `Config`.
+
     Returns
     -------
     xarray.DataTree
@@ -69,6 +74,16 @@ def curve(config: ConfigLike) -> DataTree:
     ------
     FileError, ConfigError
         If the configuration cannot be read or is wrong.
+
+    Examples
+    --------
+    >>> import mesoslip
+    >>> path, *_ = mesoslip.example("klein")  # writes klein.toml
+    >>> curve = mesoslip.curve(path)
+    >>> round(curve.attrs["K_star"] / 1e3)  # kN/m
+    142
+    >>> curve["contact_force"].attrs["units"]
+    'N'
     """
     checked = as_config(config)
     if contact_theory(checked).depends_on_velocity:

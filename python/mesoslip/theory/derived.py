@@ -47,10 +47,28 @@ def derived(config: ConfigLike) -> dict[str, Derived]:
     of a prescribed slider. The velocity of the drive is that of the first stage that moves, of a
     ramp its maximum. Equation numbers are those of Braun's "Stick-slip kinetics".
 
+    Parameters
+    ----------
+    config
+        A TOML file, an output, nested tables, or a `Config`.
+
+    Returns
+    -------
+    dict of `mesoslip.theory.derived.Derived`
+        Each with its ``value``, ``unit`` and meaning.
+
     Raises
     ------
     FileError, ConfigError
         If the configuration cannot be read or is wrong.
+
+    Examples
+    --------
+    >>> import mesoslip
+    >>> path, *_ = mesoslip.example("klein")  # writes klein.toml
+    >>> period = mesoslip.derived(path)["setup_period"]
+    >>> round(period.value, 4), period.unit
+    (0.0245, 's')
     """
     config = as_config(config)
     return {

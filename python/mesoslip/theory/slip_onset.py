@@ -142,6 +142,11 @@ def end_of_expansion(curve: ForceCurve) -> float:
 def onset(config: ConfigLike) -> xr.DataTree:
     """The onset of slip by Eqs. S46 and S47, from the force curve of the master equation.
 
+    Parameters
+    ----------
+    config
+        A TOML file, an output, nested tables, or a `Config`.
+
     Returns
     -------
     xarray.DataTree
@@ -155,6 +160,13 @@ def onset(config: ConfigLike) -> xr.DataTree:
         not move.
     RunError
         If an integration fails.
+
+    Examples
+    --------
+    >>> import mesoslip
+    >>> path, *_ = mesoslip.example("klein")  # writes klein.toml
+    >>> sorted(mesoslip.onset(path).children)
+    ['melting', 'sequential']
     """
     config = as_config(config)
     slider = config.slider.oscillator

@@ -74,6 +74,14 @@ class SteadyFront:
     Exact for the chain of blocks, by the method of Wiener and Hopf. Without drag and damping, for
     stiff contacts, the speed is c (1 - τ²)^(-1/2) with the stress over the strength τ: Amundsen et
     al., Physical Review E 92, 032406 (2015).
+
+    Examples
+    --------
+    >>> import mesoslip
+    >>> path, *_ = mesoslip.example("front-types")  # writes front-types.toml
+    >>> front = mesoslip.SteadyFront(mesoslip.Config.load(path))
+    >>> round(front.prestress, 3), round(float(front.speed(0.5)) / front.sound_velocity, 3)
+    (0.502, 1.116)
     """
 
     def __init__(self, config: Config) -> None:

@@ -61,6 +61,14 @@ class TrackResponse:
     ConfigError
         If there is no track, or contacts age, break by thermal activation, interact, keep their
         thresholds, attach with several forces or not at all, or have the stiffnesses of a table.
+
+    Examples
+    --------
+    >>> import mesoslip
+    >>> path, *_ = mesoslip.example("track")  # writes track.toml
+    >>> linear = mesoslip.TrackResponse(mesoslip.Config.load(path, ["contacts.initial=steady"]))
+    >>> linear.force_deviation > 0, linear.response([0.0, 1e8]).shape
+    (True, (2,))
     """
 
     @arguments.checked(config=arguments.instance(Config, "a Config"))

@@ -46,7 +46,7 @@ def spreading_avalanche(trees: Sequence[xr.DataTree]) -> Figure:
 )
 def avalanche_sizes(trees: Sequence[xr.DataTree]) -> Figure:
     *sliders, bundle = trees
-    figure = Figure(figsize=(6.5, 3.2))
+    figure = Figure(figsize=(7.5, 3.2))
     stationary, failing = figure.subplots(1, 2)
     for tree, color in zip(sliders, (YELLOW, RED, BLUE), strict=True):
         config = configuration(tree)

@@ -37,6 +37,12 @@ def source_figure(name: str, shows: str, runs: tuple[str, ...]) -> Callable[[Dra
     return add
 
 
+def power_of_ten(value: float) -> str:
+    """A number with one digit, as people write it."""
+    digit, _, power = f"{value:.0e}".partition("e")
+    return rf"${digit} \times 10^{{{int(power)}}}$" if value else "0"
+
+
 # Parameters in a caption, if all its runs share them.
 PARAMETERS: tuple[Callable[[Config], str | None], ...] = (
     lambda config: f"$N$ = {config.contacts.count}" if config.contact_kind.is_discrete else None,
@@ -45,7 +51,7 @@ PARAMETERS: tuple[Callable[[Config], str | None], ...] = (
     lambda config: rf"$\Delta{{f_s}}/f_s$ = {config.contacts.threshold.relative_width:.3g}",
     lambda config: f"$f_b$ = {config.contacts.back_force_ratio:g} $f_s$",
     lambda config: rf"$\tau_d$ = {config.contacts.delay * 1e3:g} ms",
-    lambda config: rf"$\eta$ = {config.contacts.drag_rate:.0e} 1/s",
+    lambda config: rf"$\eta$ = {power_of_ten(config.contacts.drag_rate)} 1/s",
     lambda config: (
         f"$K$ = {config.spring_stiffness:g} N/m" if 0 < config.spring_stiffness < np.inf else None
     ),

@@ -12,7 +12,7 @@ from mesoslip.plots.close_up import largest_slip, slip_window
 from mesoslip.plots.style import CONTACT, RED, SPRING
 from outputs import configuration
 
-from figures.base import source_figure
+from figures.base import power_of_ten, source_figure
 from figures.panels import shared_panels, stacked
 from figures.traces import draw_series
 
@@ -144,7 +144,7 @@ def viscosities(trees: Sequence[xr.DataTree]) -> Figure:
     whole, detail = figure.subplots(1, 2, width_ratios=[2, 1])
     for tree, style in zip(trees, ("-", "--", ":", "-."), strict=False):
         rate = configuration(tree).contacts.drag_rate
-        label = rf"$\eta$ = {rate:.0e} s$^{{-1}}$"
+        label = rf"$\eta$ = {power_of_ten(rate)} s$^{{-1}}$"
         draw_series(whole, tree, "spring_force", linestyle=style, label=label)
         slip = largest_slip(tree)
         if slip is not None:

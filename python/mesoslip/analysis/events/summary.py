@@ -258,6 +258,15 @@ def events(
         If the output cannot be read, or has no such catalogue.
     ConfigError
         If there is no catalogue of that name.
+
+    Examples
+    --------
+    >>> import mesoslip
+    >>> path, *_ = mesoslip.example("bundle")  # writes bundle.toml
+    >>> tree = mesoslip.run(mesoslip.Config.load(path, ["contacts.count=20000"]))
+    >>> found = mesoslip.events(tree, "avalanches")
+    >>> found["b_value"]["value"] > 0, len(found["events"])
+    (True, 24532)
     """
     check_choice("catalogue", catalogue, CATALOGUES)
     with opened_run_arrays(output) as tree:

@@ -51,7 +51,7 @@ HEADS = {
     "normal_force": ("normal force", "N"),
     "mean_friction": ("mean friction", "N"),
     "mean_friction_coefficient": ("coefficient", "1"),
-    "hersey_number": ("viscosity x speed / load", "1/m"),
+    "hersey_number": ("viscosity × speed/load", "1/m"),
 }
 # Signals of the machine, whose steps make plateaus; their names are those of variables.
 SPEEDS = ("sliding_speed", "rotation_speed")
@@ -268,7 +268,7 @@ def _row(
 
 
 def _mean_of(values: Array) -> tuple[float, float]:
-    """Mean of a steady series, and its standard error, which knows correlation."""
+    """Mean of a steady series, and its standard error, which includes correlation."""
     from scipy.special import stdtrit
 
     found = steady_mean(values[np.newaxis])
@@ -306,7 +306,7 @@ def plateaus(
     -------
     xarray.Dataset
         Dimension ``plateau``: times, mean friction after the transient with its standard error,
-        which knows that samples are correlated, the coefficient where the normal force is known,
+        which includes their correlation, the coefficient where the normal force is known,
         mean speed and load, and ``hersey_number``, viscosity times speed over load [1/m].
         Attribute ``source``: the signals.
 
@@ -316,6 +316,13 @@ def plateaus(
         If the output cannot be read, goes back and forth, or has no plateau.
     ConfigError
         If the signal is another one, or the viscosity not above 0.
+
+    Examples
+    --------
+    >>> import mesoslip
+    >>> path, *_ = mesoslip.example("measured/stribeck")  # writes the file and a description
+    >>> mesoslip.plateaus(mesoslip.read_trace(path))["mean_friction_coefficient"].shape
+    (14,)
     """
     check_choice("signal", signal, SIGNALS)
     with opened_run_arrays(output) as tree:

@@ -183,6 +183,14 @@ def regime(output: OutputLike) -> Dataset:
     ------
     FileError
         If the output cannot be read, or is neither of a run nor a measured trace.
+
+    Examples
+    --------
+    >>> import mesoslip
+    >>> path, *_ = mesoslip.example("klein")  # writes klein.toml
+    >>> config = mesoslip.Config.load(path, ["contacts.delay=0", "contacts.initial=steady"])
+    >>> mesoslip.regime(mesoslip.run(config))["regime"].values  # smooth
+    array([0], dtype=int8)
     """
     with opened_run(output) as (tree, name):
         return regimes(tree, name)

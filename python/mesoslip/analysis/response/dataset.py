@@ -118,6 +118,15 @@ def response(
     FileError
         If an output cannot be read, is not of a run, or is of a slider without mass under
         a force.
+
+    Examples
+    --------
+    >>> import mesoslip
+    >>> path, *_ = mesoslip.example("velocity-step")  # writes velocity-step.toml
+    >>> config = mesoslip.Config.load(path, ["contacts.count=500", "run.realizations=1"])
+    >>> found = mesoslip.response(mesoslip.run(config), fit=False)
+    >>> found["steady"]["steady_force"].dims, found["steps"]["net_change"].attrs["units"]
+    (('velocity_stage',), 'N')
     """
     return in_xarray(
         response_arrays(

@@ -289,13 +289,13 @@ def strokes(
     -------
     xarray.DataTree
         Group ``strokes``, dimension ``stroke``: times, ``direction`` (+1 or -1), ``length``,
-        ``velocity``, ``mean_friction`` along the motion with its standard error, which knows that
-        samples are correlated, the coefficient where the normal force is known, ``max_friction``
-        and its distance from the reversal, the forces at the reversals, and the ``stiffness`` of
-        the reversal. Group ``cycles``, dimension ``cycle``: ``loop_energy``, ``offset`` (half the
-        sum of the mean forces in both directions), and means. SI; of a measured friction
-        coefficient forces have the unit 1. Attributes: ``source``, the quantity in which strokes
-        were found, and ``notes``.
+        ``velocity``, ``mean_friction`` along the motion with its standard error, which includes
+        the correlation of samples, the coefficient where the normal force is known,
+        ``max_friction`` and its distance from the reversal, the forces at the reversals, and the
+        ``stiffness`` of the reversal. Group ``cycles``, dimension ``cycle``: ``loop_energy``,
+        ``offset`` (half the sum of the mean forces in both directions), and means. SI; of a
+        measured friction coefficient forces have the unit 1. Attributes: ``source``, the quantity
+        in which strokes were found, and ``notes``.
 
     Raises
     ------
@@ -303,6 +303,14 @@ def strokes(
         If the output cannot be read, or does not go back and forth.
     ConfigError
         If the share is not between 0 and 1.
+
+    Examples
+    --------
+    >>> import mesoslip
+    >>> path, *_ = mesoslip.example("measured/reciprocating")  # writes the file and a description
+    >>> found = mesoslip.strokes(mesoslip.read_trace(path))
+    >>> round(float(found["strokes"]["mean_friction_coefficient"].mean()), 2)
+    0.46
     """
     import xarray as xr
 

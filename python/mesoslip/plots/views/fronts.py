@@ -108,10 +108,11 @@ def draw_fronts(axes: Axes, tree: Tree, picture: Picture, horizontal: Horizontal
             axes.annotate(
                 f"{number(float(ratio), 2)} c",
                 (times.mean(), ends.mean() / scale.size),
-                xytext=(5, -3),
+                xytext=(6, -4),
                 textcoords="offset points",
                 color=RED,
                 fontsize="small",
+                bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.6},
             )
     axes.set_xlim(*shown(np.array(picture.window)))
     axes.set_ylim(0, picture.length / scale.size)

@@ -19,7 +19,7 @@ MAX_DRAWN = 20000
 MIN_RATIO = 5.0
 # Abscissas, by preference: column, label, and SI unit.
 ABSCISSAS = (
-    ("hersey_number", "viscosity x speed / load", "1/m"),
+    ("hersey_number", "viscosity × speed/load", "1/m"),
     ("sliding_speed", "speed", "m/s"),
     ("normal_force", "normal force", "N"),
     ("start_time", "time", "s"),
@@ -36,7 +36,7 @@ def _friction(found: Plateaus) -> tuple[str, str, str]:
 
 
 def draw_curve(axes: Axes, found: Plateaus) -> None:
-    """Draw the friction of each plateau over viscosity x speed / load, or what is known of it."""
+    """Draw the friction of each plateau over viscosity × speed/load, or what is known of it."""
     column, label, unit = _friction(found)
     name, title, abscissa_unit = next(
         one

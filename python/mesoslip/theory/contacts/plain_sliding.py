@@ -54,6 +54,16 @@ class SteadySliding(LinearStability):
     ConfigError
         If contacts age, interact, break by thermal activation or do not attach again, or there is
         no velocity.
+
+    Examples
+    --------
+    >>> import mesoslip
+    >>> path, *_ = mesoslip.example("klein")  # writes klein.toml
+    >>> sliding = mesoslip.SteadySliding(mesoslip.Config.load(path))
+    >>> sliding.is_stable, round(sliding.growth_rate, 1), round(sliding.frequency)  # 1/s
+    (False, 29.4, 257)
+    >>> sliding.response([100.0, 400.0]).shape  # Λ(iω), N/m
+    (2,)
     """
 
     @arguments.checked(

@@ -1,7 +1,7 @@
 ! The theory as Python calls it: flat subroutines with explicit shapes, wrapped by f2py.
 !
-! Each procedure has a status and a message as its last arguments; status 0 means success. No
-! procedure keeps state.
+! Each procedure that may fail has a status and a message as its last arguments; status 0 means
+! success. No procedure keeps state.
 
 !> Scales of the lives of contacts under a slider that moves forward, dimensionless.
 subroutine contact_scales(length, names, values, words, scales, status, message)
@@ -246,3 +246,28 @@ subroutine rate_and_state_motions(evolution, states, sets, parameters, reference
    end if
    call report(error, status, message)
 end subroutine rate_and_state_motions
+
+!> Logarithms of the normal density of residuals under white and correlated noise, up to a constant,
+!> -huge where the covariance is not positive.
+subroutine noise_log_densities(sets, points, starts, ends, counts, residual, deviation, share, &
+   & time, density)
+   !f2py threadsafe
+   use mesoslip_numerics_correlated_noise, only: log_density
+   implicit none
+   !> Number of sets of residuals and noise, and of points
+   integer, intent(in) :: sets, points
+   !> Start and end of each point, and its number of samples
+   real(8), intent(in) :: starts(points), ends(points), counts(points)
+   real(8), intent(in) :: residual(points, sets)
+   !> Of each set: standard deviation of a sample, share of the correlated noise in its variance,
+   !> and the correlation time
+   real(8), intent(in) :: deviation(sets), share(sets), time(sets)
+   real(8), intent(out) :: density(sets)
+
+   integer :: set
+
+   do set = 1, sets
+      density(set) = log_density(starts, ends, counts, residual(:, set), deviation(set), &
+         & share(set), time(set))
+   end do
+end subroutine noise_log_densities

@@ -84,6 +84,8 @@ module mesoslip_theory_rate_and_state
    type :: motion_type
       !> The slider
       type(friction_type) :: friction
+      !> 1/a, and 1/D of each state variable
+      real(wp) :: per_a = 1.0_wp, per_distance(max_states) = 1.0_wp
       !> Velocity of the load point at time 0, and its acceleration
       real(wp) :: velocity = 0.0_wp, acceleration = 0.0_wp
       !> Time in the stage
@@ -100,7 +102,6 @@ module mesoslip_theory_rate_and_state
       logical :: failed = .false.
    contains
       procedure :: advance
-      procedure :: state_at
       procedure, private :: rates
       procedure, private :: derivatives
       procedure, private :: try_step
@@ -123,11 +124,14 @@ contains
 
       type(motion_type) :: motion
       real(wp) :: begin, load_start, moved, since, first, friction_part, finish
+      real(wp) :: share, ends(2), terms(2)
       integer :: stage, point, last
 
       force = 0.0_wp
       displacement = 0.0_wp
       motion%friction = friction
+      motion%per_a = 1.0_wp / friction%a
+      motion%per_distance = 1.0_wp / friction%distance
       associate (k => friction%stiffness, trend => friction%trend)
          motion%state(0) = log(load%start_velocity(1) * k / (k + trend) &
             & / friction%reference_velocity)
@@ -148,11 +152,18 @@ contains
             do while (motion%time < finish .and. point <= size(times))
                call motion%advance(finish, tolerance)
                if (motion%failed) exit
+               ! The friction within the step is the polynomial of the state.
+               ends = [variable_part(friction, motion%state_before), &
+                  & variable_part(friction, motion%state)]
+               terms = [variable_part(friction, motion%terms(:, 1)), &
+                  & variable_part(friction, motion%terms(:, 2))]
                do while (point <= size(times))
                   since = times(point) - begin
                   if (since > motion%time) exit
                   ! The force of the spring and that of friction are equal: this gives X.
-                  friction_part = variable_part(friction, motion%state_at(since))
+                  share = (since - motion%time_before) / (motion%time - motion%time_before)
+                  friction_part = (1.0_wp - share) * ends(1) + share * (ends(2) &
+                     & + (1.0_wp - share) * (terms(1) + share * terms(2)))
                   moved = load_start &
                      & + (motion%velocity + 0.5_wp * motion%acceleration * since) * since
                   displacement(point) = (k * moved - friction_part + first) / (k + trend)
@@ -214,7 +225,7 @@ contains
          self%steps = self%steps + 1
          if (.not. error <= huge(1.0_wp) .or. maxval(abs(next)) > max_exponent) error = huge(1.0_wp)
          error = error / tolerance
-         factor = min(5.0_wp, max(0.2_wp, 0.9_wp * max(error, 1.0e-12_wp)**(-0.25_wp)))
+         factor = min(5.0_wp, max(0.2_wp, 0.9_wp / sqrt(sqrt(max(error, 1.0e-12_wp)))))
          if (error <= 1.0_wp) then
             self%time_before = self%time
             self%state_before = self%state
@@ -228,20 +239,6 @@ contains
          if (error <= 1.0_wp .or. self%failed) return
       end do
    end subroutine advance
-
-   !> u and psi at a time within the last step
-   pure function state_at(self, time) result(state)
-      class(motion_type), intent(in) :: self
-      !> Time in the stage
-      real(wp), intent(in) :: time
-      real(wp) :: state(0:max_states)
-
-      real(wp) :: s
-
-      s = (time - self%time_before) / (self%time - self%time_before)
-      state = (1.0_wp - s) * self%state_before + s * (self%state &
-         & + (1.0_wp - s) * (self%terms(:, 1) + s * self%terms(:, 2)))
-   end function state_at
 
    !> A step, the motion within it, and the estimate of its error
    pure subroutine try_step(self, step, next, terms, error)
@@ -257,24 +254,39 @@ contains
 
       real(wp) :: k(0:max_states, stages), right(0:max_states), rate(0:max_states)
       real(wp) :: inner(0:max_states), up(max_states), down(max_states), diagonal(max_states)
-      real(wp) :: corner, inverse
-      integer :: stage, n
+      real(wp) :: corner, inverse, per_step, pull
+      integer :: stage, before, one, n
 
       n = self%friction%states
-      inverse = 1.0_wp / (gamma * step)
+      per_step = 1.0_wp / step
+      inverse = per_step / gamma
       call self%derivatives(corner, up, down, diagonal)
       corner = inverse - corner
-      diagonal = inverse - diagonal
-      corner = corner - sum(up(:n) * down(:n) / diagonal(:n))
       k = 0.0_wp
+      do one = 1, n
+         diagonal(one) = 1.0_wp / (inverse - diagonal(one))
+         up(one) = up(one) * diagonal(one)
+         corner = corner - up(one) * down(one)
+      end do
+      corner = 1.0_wp / corner
+      pull = step * self%friction%stiffness * self%acceleration * self%per_a
       do stage = 1, stages
-         inner = self%state + matmul(k(:, :stage - 1), A(:stage - 1, stage))
+         inner = self%state
+         right = 0.0_wp
+         do before = 1, stage - 1
+            inner = inner + A(before, stage) * k(:, before)
+            right = right + C(before, stage) * k(:, before)
+         end do
          call self%rates(self%time + alpha(stage) * step, inner, rate)
-         right = rate + matmul(k(:, :stage - 1), C(:stage - 1, stage)) / step
-         right(0) = right(0) + gammas(stage) * step &
-            & * self%friction%stiffness * self%acceleration / self%friction%a
-         k(0, stage) = (right(0) + sum(up(:n) * right(1:n) / diagonal(:n))) / corner
-         k(1:n, stage) = (right(1:n) + down(:n) * k(0, stage)) / diagonal(:n)
+         right = rate + per_step * right
+         right(0) = right(0) + gammas(stage) * pull
+         do one = 1, n
+            right(0) = right(0) + up(one) * right(one)
+         end do
+         k(0, stage) = right(0) * corner
+         do one = 1, n
+            k(one, stage) = (right(one) + down(one) * k(0, stage)) * diagonal(one)
+         end do
       end do
       next = inner + k(:, stages)
       terms = matmul(k, D)
@@ -298,14 +310,14 @@ contains
          do one = 1, friction%states
             if (friction%evolution == evolution_ageing) then
                rate(one) = (friction%reference_velocity * exp(min(-state(one), max_exponent)) &
-                  & - velocity) / friction%distance(one)
+                  & - velocity) * self%per_distance(one)
             else
-               rate(one) = -velocity * (state(0) + state(one)) / friction%distance(one)
+               rate(one) = -velocity * (state(0) + state(one)) * self%per_distance(one)
             end if
          end do
          rate(0) = (friction%stiffness * (self%velocity + self%acceleration * time) &
             & - (friction%stiffness + friction%trend) * velocity &
-            & - sum(friction%b(:friction%states) * rate(1:friction%states))) / friction%a
+            & - sum(friction%b(:friction%states) * rate(1:friction%states))) * self%per_a
       end associate
    end subroutine rates
 
@@ -325,18 +337,18 @@ contains
          velocity = friction%reference_velocity * exp(self%state(0))
          do one = 1, n
             if (friction%evolution == evolution_ageing) then
-               down(one) = -velocity / friction%distance(one)
+               down(one) = -velocity * self%per_distance(one)
                diagonal(one) = -friction%reference_velocity * exp(-self%state(one)) &
-                  & / friction%distance(one)
+                  & * self%per_distance(one)
             else
                down(one) = -velocity * (self%state(0) + self%state(one) + 1.0_wp) &
-                  & / friction%distance(one)
-               diagonal(one) = -velocity / friction%distance(one)
+                  & * self%per_distance(one)
+               diagonal(one) = -velocity * self%per_distance(one)
             end if
          end do
-         up(:n) = -friction%b(:n) * diagonal(:n) / friction%a
+         up(:n) = -friction%b(:n) * diagonal(:n) * self%per_a
          corner = (-(friction%stiffness + friction%trend) * velocity &
-            & - sum(friction%b(:n) * down(:n))) / friction%a
+            & - sum(friction%b(:n) * down(:n))) * self%per_a
       end associate
    end subroutine derivatives
 

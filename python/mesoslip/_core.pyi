@@ -82,6 +82,17 @@ def onset(
     samples: NDArray[np.float64],
     capacity: int = ...,
 ) -> tuple[int, int, int, bytes]: ...
+def noise_log_densities(
+    starts: NDArray[np.float64],
+    ends: NDArray[np.float64],
+    counts: NDArray[np.float64],
+    residual: NDArray[np.float64],
+    deviation: NDArray[np.float64],
+    share: NDArray[np.float64],
+    time: NDArray[np.float64],
+    sets: int = ...,
+    points: int = ...,
+) -> NDArray[np.float64]: ...
 def open_simulation(handle: NDArray[np.int64]) -> None: ...
 def philox(
     counter: NDArray[np.int64], key: NDArray[np.int64], length: int = ...

@@ -33,8 +33,10 @@ from mesoslip.inference.sampler import check_installed, draw, step_count
 # Names of the parameters of the noise.
 NOISE = ("noise", "noise_share", "noise_time")
 CHAINS = 4
-# Tolerance of the motions.
+# Tolerance of predicted motions; and those of sampled ones, whose forces are wrong by about a fifth
+# of it in units of a: this part of the noise of the most exact point over a, within limits.
 TOLERANCE = 1e-5
+NOISE_TOLERANCE, TOLERANCES = 0.025, (1e-6, 1e-4)
 # Ranges of the prior: reference force and trend over the range of the record and over that along
 # its length, a over the friction, noise over the range.
 MAX_LEVEL, MAX_TREND = 2.0, 10.0
@@ -175,6 +177,12 @@ class Density:
         law, at = self.law, self.fit.at
         return estimated_noise(law.points, law.residuals(at), law.jacobian(at))
 
+    @cached_property
+    def tolerance(self) -> float:
+        """Tolerance of the motions, whose errors are far below the noise."""
+        exact = float(self.own_noise.point_deviation.min()) * self.law.scale
+        return float(np.clip(NOISE_TOLERANCE * exact / self.fit.value("a"), *TOLERANCES))
+
     def __call__(self, unit: Array) -> Array:
         """The logarithm at points of shape (points, parameters), up to a constant."""
         law, values = self.law, self.prior.values(unit)
@@ -186,7 +194,7 @@ class Density:
         if not possible.any():
             return value
         values = values[possible]
-        forces, _, failed = law.forces(law.scaled(values[:, : len(law.names)]), TOLERANCE)
+        forces, _, failed = law.forces(law.scaled(values[:, : len(law.names)]), self.tolerance)
         residual = law.points.force / law.scale - forces
         deviation, share, time = values[:, -len(NOISE) :].T
         likelihood = self.noise.log_likelihood(residual, deviation / law.scale, share, time)

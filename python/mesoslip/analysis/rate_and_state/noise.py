@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mesoslip import _core
 from mesoslip.analysis.rate_and_state.points import Points
 from mesoslip.array_types import Array
 
@@ -168,31 +169,12 @@ class NoiseModel:
         """Logarithm of the normal density of residuals, shape (sets,), by `covariance` without its
         matrix.
 
-        Residuals have the shape (sets, points), the parameters of the noise (sets,). The
-        correlation decays by one factor from each point to the next: less that of the point before
-        times this factor, residuals are correlated with their neighbours only (tridiagonal).
+        Residuals have the shape (sets, points), the parameters of the noise (sets,).
         """
-        from scipy.linalg.lapack import dptsv
-
-        length, variance, part = (one[:, None] for one in (time, deviation**2, share))
-        size = np.maximum((self.end - self.start) / length, 1e-9)
-        change = np.expm1(-size)
-        damped = -change / size
-        decay = np.exp(-np.maximum(self.start[1:] - self.end[:-1], 0.0) / length)
-        factor = damped[:, 1:] / damped[:, :-1] * decay * (1 + change[:, :-1])
-        diagonal = variance * (part * _mean_square(size, change) + (1 - part) / self.count)
-        beside = variance * part * damped[:, 1:] * damped[:, :-1] * decay
-        before = diagonal[:, :-1]
-        rest = residual.copy()
-        rest[:, 1:] -= factor * residual[:, :-1]
-        off = beside - factor * before
-        diagonal[:, 1:] += factor * (factor * before - 2 * beside)
-        value = np.full(len(residual), -math.inf)
-        for one in range(len(value)):
-            pivots, _, solved, failed = dptsv(diagonal[one], off[one], rest[one])
-            if failed == 0:
-                value[one] = -0.5 * (np.sum(np.log(pivots)) + rest[one] @ solved)
-        return value
+        value = _core.noise_log_densities(
+            self.start, self.end, self.count, residual.T, deviation, share, time
+        )
+        return np.where(value > -np.finfo(float).max, value, -np.inf)
 
 
 def estimated_noise(points: Points, residual: Array, jacobian: Array) -> Noise:

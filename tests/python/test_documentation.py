@@ -59,6 +59,7 @@ LONG_PAGES = [
     "teaching.md",
     "tutorial-fit.md",
     "tutorial.md",
+    "../README.md",
 ]
 
 # Those that are run without being made shorter too.
@@ -136,7 +137,7 @@ class Block:
 
 def with_long_ones(pages):
     """Pages, of which the long ones are left to `make docs`."""
-    long_pages = {DOCS / name for name in LONG_PAGES}
+    long_pages = {(DOCS / name).resolve() for name in LONG_PAGES}
     return [long(page) if page in long_pages else page for page in pages]
 
 

@@ -156,7 +156,7 @@ def test_rigid_with_reversals_converges_to_events(klein, law):
     # Among them are breaks both ways and in the hold; what follows is sensitive to rounding.
     first = 40
     late = []
-    for step in (8e-6, 2e-6):
+    for step in (4e-6, 1e-6):
         _, contacts = fixed_step(config, step)
         assert [one for _, one in contacts.events[:first]] == [one for _, one in events[:first]]
         pairs = zip(contacts.events[:first], events[:first], strict=True)

@@ -194,8 +194,11 @@ def cohort_force(config: Config, step: float, path: np.ndarray, thresholds: int)
     return np.array(force)
 
 
-@pytest.mark.parametrize("ageing", [None, LOG], ids=["", "log"])
-@pytest.mark.parametrize("delay", [0.0, 20.0])
+@pytest.mark.parametrize(
+    ("ageing", "delay"),
+    [(None, 20.0), (LOG, 0.0), long(None, 0.0), long(LOG, 20.0)],
+    ids=["delay", "log", "plain", "log, delay"],
+)
 def test_response_is_that_of_cohorts_in_small_steps(ageing, delay):
     """The master equation in small steps of time, under a slider that oscillates a little."""
     velocity, amplitude, frequency = 1e-2, 1e-3, 0.15
@@ -219,8 +222,8 @@ def test_response_is_that_of_cohorts_in_small_steps(ageing, delay):
 
 @pytest.mark.parametrize(
     ("velocity", "ageing", "thresholds"),
-    [(1e-3, LOG, 12), (1e-3, None, 12), (3e-2, LOG, 20), (1e-3, SLOW_LOG, 12)],
-    ids=["ageing", "no ageing", "thresholds reached", "strengthening"],
+    [(3e-2, LOG, 20), (1e-3, SLOW_LOG, 12), long(1e-3, LOG, 12), long(1e-3, None, 12)],
+    ids=["thresholds reached", "strengthening", "ageing", "no ageing"],
 )
 def test_rate_and_state_are_those_of_a_velocity_step_of_cohorts(velocity, ageing, thresholds):
     """a: the evolution continued back to the step; a - b: the end; D_c: the area between."""

@@ -319,7 +319,6 @@ def test_commands(tmp_path, capsys, monkeypatch):
         ("lattice.png", ("--view", "lattice")),
         ("start.png", ("--view", "lattice", "--snapshot", "0")),
         ("spread.gif", ()),
-        ("film.gif", ("--snapshot", "0")),
     ):
         command("plot", output, "-o", tmp_path / name, *words)
         assert (tmp_path / name).stat().st_size > 3000

@@ -292,7 +292,8 @@ def test_commands_import_what_they_need(short, tmp_path, command):
         ["slips", str(output)],
         ["regime", str(output)],
         ["plot", str(output), "-o", str(tmp_path / "short.png")],
-        ["report", str(steps), "-o", str(tmp_path / "steps.html")],
+        ["report", str(output), "-o", str(tmp_path / "short.html")],
+        ["response", str(steps), "--no-fit"],
         ["sweep", str(study), "-o", str(tmp_path / "study.nc"), "--pool", "threads", "--quiet"],
     ]
     code = f"""
@@ -323,6 +324,7 @@ json.dump(found, stdout)
         [],
         [],
         ["matplotlib"],
+        [],
         [],
         ["pandas", "xarray"],
     ]

@@ -118,7 +118,7 @@ def run(request):
 
 
 @pytest.mark.parametrize("kind", NOISES)
-@pytest.mark.parametrize("relative", [5e-4, 5e-3])
+@pytest.mark.parametrize("relative", [5e-4, long(5e-3)])
 def test_slips_under_every_noise_are_those_of_the_exact_catalogue(run, kind, relative):
     exact, time = mesoslip.slips(run), run["time"].values
     level = relative * STATIC_FORCE

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from conftest import long
 from mesoslip import Config, Realization
 from numpy.typing import NDArray
 from plain_interface import PlainInterface
@@ -67,7 +68,7 @@ BOTH = {"loading": "both", "top_stiffness": 25.0, "neighbour_damping": 0.7, "dam
         (1, 6.0, {"damping": 0.4}, 30),
         (4, 7.0, {"neighbour_damping": 0.5}, 100),
         (4, 5.0, BOTH, 100),
-        (16, 8.0, {"neighbour_damping": 0.5}, 130),
+        long(16, 8.0, {"neighbour_damping": 0.5}, 130),
     ],
 )
 def test_a_plain_code_with_the_same_contacts_moves_alike(blocks, duration, slider, min_breaks):

@@ -137,8 +137,9 @@ def test_references_are_those_of_the_paper_and_of_the_citation_file():
 
 
 def test_a_section_has_the_program_and_each_reference_once(klein):
-    first = mesoslip.curve(klein())
-    other = mesoslip.curve(klein(contacts__threshold__relative_width=0.02))
+    near = {"curve": {"length": 3 * klein().contacts.break_stretch}}
+    first = mesoslip.curve(klein(**near))
+    other = mesoslip.curve(klein(**near, contacts__threshold__relative_width=0.02))
     section = methods([Subject("a", first), Subject("b", other)])
     texts = [block.text for block in section.blocks]
     assert "The output b differs in contacts.threshold.relative_width = 0.02." in texts

@@ -104,14 +104,16 @@ def test_there_is_no_onset_in_smooth_sliding(klein):
 
 
 def test_an_onset_needs_a_slider_that_can_slip(klein):
+    near = {"curve": {"length": 3 * klein().contacts.break_stretch}}
     with pytest.raises(ConfigError, match=r"slider\.kind"):
         mesoslip.onset(klein(slider={"kind": "prescribed"}))
     with pytest.raises(ConfigError, match="drive"):
-        mesoslip.onset(klein(drive__velocity=0.0))
+        mesoslip.onset(klein(drive__velocity=0.0, **near))
 
 
 def test_a_film_too_viscous_to_let_the_force_drop(klein):
-    tree = mesoslip.onset(klein(contacts__drag_rate=2e19))
+    near = {"length": 3 * klein().contacts.break_stretch}
+    tree = mesoslip.onset(klein(contacts__drag_rate=2e19, curve=near))
     assert set(tree.children) == {"sequential"}
     assert "S47 has no solution" in tree.attrs["comment"]
     assert "beta" not in tree.attrs

@@ -273,7 +273,7 @@ def test_a_long_run_is_written_in_little_memory(tmp_path):
         assert tree["slip_traces/sample_time"].values[100_000] == 100_000
 
 
-@pytest.mark.parametrize("threads", [1, 2])
+@pytest.mark.parametrize("threads", [long(1), 2])
 def test_a_file_that_cannot_grow_is_an_error(results, tmp_path, threads):
     """Wherever it ends: one message, nothing left behind, and the next file is whole."""
     path = tmp_path / "out.nc"

@@ -24,7 +24,7 @@ def mean_force(config, skip: float) -> tuple[float, float]:
     return float(means.mean()), float(means.std(ddof=1) / np.sqrt(len(means)))
 
 
-@pytest.mark.parametrize("coupling", ["scaled", "equal"])
+@pytest.mark.parametrize("coupling", ["scaled", long("equal")])
 @pytest.mark.parametrize("law", LAWS)
 def test_slow_sliding_gives_the_stationary_force(klein, law, coupling):
     config = klein(

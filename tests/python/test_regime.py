@@ -261,7 +261,7 @@ def test_marked_motions():
     module = study("marked_motions")
     motions = [one for one in module.load() if one["kind"] in {"layers", "lattice", "fast"}]
     assert len(module.load()) == 140
-    for one in module.classified(motions[1::18]):
+    for one in module.classified(motions[1::30]):
         assert one.regime in one.marks, one.configuration
         assert one.regime in NAMES
 

@@ -36,7 +36,7 @@ def sliding(klein, **changes):
 @pytest.mark.parametrize(
     ("ageing", "law", "velocity"),
     [
-        *((None, "fixed", 1e-7), (LOG, "exponential", 1e-5), long(RELAX, "fixed", 1e-7)),
+        *((LOG, "exponential", 1e-5), long(None, "fixed", 1e-7), long(RELAX, "fixed", 1e-7)),
         *(long(None, "fixed", 1e-5), long(LOG, "exponential", 1e-7), long(RELAX, "fixed", 1e-5)),
         *(long(None, "exponential", 1e-5), long(LOG, "fixed", 1e-5)),
         long(RELAX, "exponential", 1e-5),
@@ -163,7 +163,7 @@ def test_the_critical_spring_of_layers_is_where_stability_ends(klein, layers, da
     [
         (0.0, 0.0274, 2e-5, 0.3, 4e11, "fixed"),
         (1.0, 2e-5, 1e-5, 0.02, 8e10, "exponential"),
-        (1.0, 2e-4, 2e-6, 0.1, 2e9, "fixed"),
+        long(1.0, 2e-4, 2e-6, 0.1, 2e9, "fixed"),
     ],
 )
 def test_the_critical_spring_with_delay_is_the_stiffest_one(

@@ -9,6 +9,7 @@ from typing import Any
 import mesoslip
 import numpy as np
 import pytest
+from conftest import long
 from kinds import configuration
 from mesoslip import Config, ConfigError, SteadyFront
 from mesoslip.analysis.fronts import FRONT_TYPES, first_front
@@ -125,9 +126,9 @@ def plain_front(
 @pytest.mark.parametrize(
     ("stress", "scaled"),
     [
-        (0.5, {}),
+        long(0.5, {}),
         (0.4, {"viscosity": 0.3}),
-        (0.5, {"drag": 1.0}),
+        long(0.5, {"drag": 1.0}),
         (0.3, {"drag": 0.3, "contacts": 5.0}),
         (0.5, {"drag": 1.0, "viscosity": 0.2, "contacts": 5.0, "top": 0.1}),
     ],

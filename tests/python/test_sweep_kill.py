@@ -122,7 +122,7 @@ def test_ctrl_c_keeps_what_is_done(pool, tmp_path, sweep_file, command):
     assert not (tmp_path / "out" / "sweep.partial.nc").exists()
 
 
-def test_a_point_that_ends_its_workers_fails_alone(tmp_path, sweep_file):
+def test_a_point_that_ends_its_workers_fails_alone(tmp_path, sweep_file, command):
     own = (
         "import os\ndef deadly(tree):\n"
         "    if tree['realization'].values[0] == 1:\n        os.kill(os.getpid(), 9)\n"
@@ -132,9 +132,10 @@ def test_a_point_that_ends_its_workers_fails_alone(tmp_path, sweep_file):
     output = tmp_path / "sweep.nc"
     text = SIMPLE.replace("mean_force", "own.py:deadly").replace('"0.1 ms", ', "")
     path = sweep_file(text)
-    process = begin(path, output, "--pool", "processes", "--workers", "1")
-    _, printed = process.communicate(timeout=120)
-    assert process.returncode == 1
+    status, _, printed = command(
+        "sweep", path, "-o", output, "--pool", "processes", "--workers", "1"
+    )
+    assert status == 1
     assert printed.count("3 workers died; the last one was ended by signal 9") == 1
     np.testing.assert_array_equal(xr.load_dataset(output)["status"], [[0, 1]])
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import mesoslip
 import numpy as np
 import pytest
-from conftest import klein_tables
+from conftest import klein_tables, long
 from mesoslip import Config, ConfigError
 from mesoslip.configuration.threshold_laws.table import stretch_cells
 from mesoslip.theory.contacts.plain_sliding import SteadySliding
@@ -168,7 +168,7 @@ def test_first_loading_and_steady_force_are_sums_over_the_rows(uneven, kind):
 @pytest.mark.parametrize(
     "changes",
     [
-        FORWARD | {"contacts__initial": "uniform"},
+        long(FORWARD | {"contacts__initial": "uniform"}),
         FORWARD | {"contacts__initial": "steady", "contacts__newborn_width": 0.05},
         BACK_AND_FORTH,
     ],

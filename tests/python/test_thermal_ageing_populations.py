@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from conftest import long
 from kinds import RELAX, configuration
 from mesoslip import Config, Realization
 from mesoslip.theory.contacts import contact_theory
@@ -21,8 +22,8 @@ YOUNG = {"law": "relax", "time": 30.0, "young_force_ratio": 0.6, "young_relative
     ("threshold", "ageing", "ratio", "velocity"),
     [
         ({"law": "gaussian", "relative_width": 0.2}, LOG, 0.02, 1e-4),
-        ({"law": "gaussian", "relative_width": 0.1}, YOUNG, 0.04, 1e-1),
-        ({"law": "uniform", "relative_width": 0.3}, LOG, 0.08, 1e-1),
+        long({"law": "gaussian", "relative_width": 0.1}, YOUNG, 0.04, 1e-1),
+        long({"law": "uniform", "relative_width": 0.3}, LOG, 0.08, 1e-1),
         ({"law": "weibull", "relative_width": 0.2}, YOUNG, 0.04, 1e-1),
     ],
 )

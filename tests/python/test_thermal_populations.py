@@ -178,7 +178,7 @@ def test_without_temperature_it_is_the_model_without():
 @pytest.mark.parametrize(
     "changes",
     [
-        {},
+        long({}),
         {"contacts__delay_law": "exponential"},
         long({"contacts__newborn_width": 0.05}),
         {"contacts__newborn_width": 0.05, "contacts__initial": "steady"},

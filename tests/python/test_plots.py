@@ -544,6 +544,10 @@ def test_onsets_have_dimensions_or_the_reason_why_there_is_none(klein, theory):
     for name in still.children:
         still[name] = tree[name].to_dataset().map(np.zeros_like, keep_attrs=True)
     mesoslip.plot(still)
+    for name in list(still.children):
+        still[f"{name}_unknown"] = still[name].copy()
+        del still[name]
+    mesoslip.plot(still)
     none = mesoslip.plot(mesoslip.onset(klein(slider__stiffness=1e6)))
     assert "there is no onset" in none.axes[0].texts[0].get_text()
     # A curve and an onset have neither realizations nor times.

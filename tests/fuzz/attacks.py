@@ -282,12 +282,16 @@ LONG: dict[str, dict[str, Any]] = {
 def damaged(data: bytes, random: Random) -> bytes:
     """A file with some bytes changed or missing."""
     changed = bytearray(data)
-    what = random.choice(["bits", "bits", "bytes", "zeros", "cut", "more", "moved"])
+    what = random.choice(["bits", "bits", "bytes", "heap", "zeros", "cut", "more", "moved"])
     place, length = random.randrange(len(data)), random.randint(1, 4096)
     if what in {"bits", "bytes"}:
         for _ in range(random.choice([1, 1, 3, 30])):
             where = random.randrange(random.choice([len(data), min(len(data), 4096)]))
             changed[where] ^= 1 << random.randrange(8) if what == "bits" else random.randrange(256)
+    elif what == "heap":
+        # It has no checksum, and the library follows the sizes of its objects.
+        where = data.find(b"GCOL") + random.randrange(1024)
+        changed[where] = random.randrange(256)
     elif what == "zeros":
         changed[place : place + length] = bytes(len(changed[place : place + length]))
     elif what == "cut":

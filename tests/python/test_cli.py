@@ -213,6 +213,16 @@ def test_of_many_rows_the_first_and_the_last_are_printed(tmp_path, command, monk
     assert "… (2 others, all with --json)" in regimes
 
 
+def test_a_table_for_a_paper_is_not_one_of_dashes(short, tmp_path, command):
+    """A run in one stage has a steady force, and nothing that rate and state could fit."""
+    output = tmp_path / "run.nc"
+    assert command("run", short, "-o", output, "--quiet")[0] == 0
+    assert "no data for a, b and D_c" in command("response", output)[1]
+    printed = command("response", output, "--latex")[1]
+    assert "steady force &" in printed
+    assert "verdict" not in printed
+
+
 def test_an_interrupt_after_the_output_is_written_is_answered_at_once(
     short, tmp_path, command, monkeypatch
 ):

@@ -401,6 +401,8 @@ def test_a_clock_that_starts_again_makes_parts():
     assert len(ordered(time, part=1)[0]) == 10
     with pytest.raises(mesoslip.FileError, match="there is no part 3"):
         ordered(time, part=3)
+    with pytest.raises(mesoslip.FileError, match="has 1 part; there is no part 2"):
+        ordered(np.arange(9.0), part=2)
 
 
 def test_rounded_times_are_spread():

@@ -539,6 +539,15 @@ def test_onsets_have_dimensions_or_the_reason_why_there_is_none(klein, theory):
     (inset,) = axes.child_axes
     assert 0.5 < inset.lines[0].get_xdata()[-1] / inset.get_xlim()[1] < 1
     assert 0.5 < inset.lines[0].get_ydata()[-1] / inset.get_ylim()[0] < 1
+    # Of a damaged file: nothing to enlarge.
+    still = tree.copy()
+    for name in still.children:
+        still[name] = tree[name].to_dataset().map(np.zeros_like, keep_attrs=True)
+    mesoslip.plot(still)
+    for name in list(still.children):
+        still[f"{name}_unknown"] = still[name].copy()
+        del still[name]
+    mesoslip.plot(still)
     none = mesoslip.plot(mesoslip.onset(klein(slider__stiffness=1e6)))
     assert "there is no onset" in none.axes[0].texts[0].get_text()
     # A curve and an onset have neither realizations nor times.

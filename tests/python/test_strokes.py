@@ -150,6 +150,20 @@ def test_reversals_are_no_slips(shape: str, sensor: int) -> None:
     np.testing.assert_allclose(along * (found.force_after - 0.2), 0.6, atol=0.05)
 
 
+def test_a_fall_over_reversals_is_no_period_of_the_setup() -> None:
+    """The only fall that stands out, of Coulomb friction, is over many strokes."""
+    time = np.arange(60_000) * 1e-3
+    angle = 2 * np.pi * time / 7
+    noise = 0.01 * np.random.default_rng(1).standard_normal(time.size)
+    force = 0.3 * np.sign(np.cos(angle)) + noise
+    pieces, _ = record_pieces(time, force, None, 1e-4 * np.sin(angle))
+    found = find_slips_between_reversals(pieces, time, force)
+    assert len(found) == 0
+    assert np.isinf(found.period)
+    given = find_slips_between_reversals(pieces, time, force, period=0.1)
+    assert given.period == 0.1
+
+
 def test_sliding_parts_have_no_reversals() -> None:
     """Put one after the other, the sliding parts of friction in strokes are constant."""
     x = drive("sine", phases())

@@ -160,6 +160,11 @@ def test_what_cannot_be_thinned(tmp_path):
             written(tmp_path / "a.csv", 1 + rng.random(COUNT), uneven), rate="20 Hz"
         )
     path = written(tmp_path / "b.csv", 1 + rng.random(COUNT))
+    with pytest.raises(FileError, match=r"has \d samples at 0.01 Hz; a trace needs at least 4"):
+        mesoslip.read_trace(path, rate="0.01 Hz")
+    empty = written(tmp_path / "c.csv", np.full(9, np.nan), TIME[:9])
+    with pytest.raises(FileError, match="has 0 samples beside 9 without time or force"):
+        mesoslip.read_trace(empty)
     tree = mesoslip.read_trace(path, rate="900 Hz")
     assert tree.sizes["time"] == COUNT
     assert "not thinned: recorded at 1000 Hz" in tree.attrs["understood"]

@@ -110,8 +110,9 @@ def response(
         print_json(names | groups | scalars)
         return
     if as_latex or as_markdown:
-        # Without fits, the table of steady forces.
-        chosen = next(iter(reversed(tables(tree))), None)
+        # Without fits, or with nothing that they could fit, the table before.
+        filled = [one for one in tables(tree) if any(set("".join(row)) - {"-"} for row in one.rows)]
+        chosen = next(reversed(filled), None)
         if chosen is not None:
             typer.echo((latex if as_latex else markdown)(chosen))
         return

@@ -211,7 +211,7 @@ class TraceDescription(Table):
             raise problem("normal_stress", "give either this or trace.normal_force")
         start, end = self.si("start"), self.si("end")
         if start is not None and end is not None and start >= end:
-            raise problem("end", "must be after trace.start")
+            raise problem("end", "must be after the start")
         return self
 
     def si(self, name: str) -> float | None:

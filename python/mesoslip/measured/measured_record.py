@@ -132,11 +132,14 @@ def read_record(paths: Sequence[Path], trace: TraceDescription) -> Record:
         notes.append(f"left out, without time or force: {table.row} {listed(lines)}")
     rows = np.flatnonzero(whole & inside)
     if len(rows) < MIN_SAMPLES:
-        raise FileError(
-            f"{path}: has {len(rows)} samples"
-            f"{' between start and end' if not inside.all() else ''}; a trace needs at least "
-            f"{MIN_SAMPLES}"
-        )
+        given = trace.si("rate")
+        where = [
+            *(["between start and end"] if not inside.all() else []),
+            *([f"at {with_unit(given, 'Hz')}"] if given is not None else []),
+            *([f"beside {left_out.sum()} without time or force"] if left_out.any() else []),
+        ]
+        counted = " ".join([f"{len(rows)} samples", *where])
+        raise FileError(f"{path}: has {counted}; a trace needs at least {MIN_SAMPLES}")
     # A slice has no copies.
     usable = rows if len(rows) < len(whole) else slice(None)
     times = time[usable]

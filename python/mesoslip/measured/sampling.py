@@ -62,6 +62,7 @@ def in_order(
     notes: list[str] = []
     rows = np.arange(len(time))
     if not (np.diff(time) <= 0).any():
+        _check_part(path, part, 1)
         return Order(rows, time, notes)
     falling = np.diff(time) < 0
     if falling.sum() > max(MAX_STEPS_BACK, 0.2 * len(time)) or falling.all():
@@ -122,6 +123,12 @@ def _without_repeated(
     return rows[kept]
 
 
+def _check_part(path: Path, part: int | None, count: int) -> None:
+    if part is not None and part > count:
+        parts = "1 part" if count == 1 else f"{count} parts"
+        raise FileError(f"{path}: has {parts}; there is no part {part}")
+
+
 def _one_part(
     path: Path,
     time: Array,
@@ -145,8 +152,7 @@ def _one_part(
         notes.append(f"times step back {late} times to blocks written late, put in order")
     joined = [np.concatenate(one) for one in parts]
     whole = [one[np.argsort(time[one], kind="stable")] for one in joined]
-    if part is not None and part > len(whole):
-        raise FileError(f"{path}: has {len(whole)} parts; there is no part {part}")
+    _check_part(path, part, len(whole))
     chosen = part - 1 if part is not None else int(np.argmax([len(one) for one in whole]))
     if len(whole) > 1:
         shown = "; ".join(

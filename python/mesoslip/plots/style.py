@@ -125,6 +125,9 @@ def axes_height(axes: Axes) -> float:
 
 def legend_above(axes: Axes, columns: int = 3, title: str | None = None) -> None:
     """Put the legend above axes, where it hides no data, in up to a number of columns."""
+    if title is None and not axes.get_legend_handles_labels()[0]:
+        # Nothing was drawn, as of a damaged output.
+        return
     axes.legend(
         loc="lower left",
         bbox_to_anchor=(0, 1.0),

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from mesoslip.analysis.noise import TraceNoise, estimate_noise
-from mesoslip.analysis.sampled_slips import FoundSlips, find_slips
+from mesoslip.analysis.sampled_slips import FoundSlips, fall_period, find_slips
 from mesoslip.analysis.strokes.segments import Piece
 from mesoslip.analysis.strokes.sliding import sliding_of
 from mesoslip.array_types import Array
@@ -58,8 +58,13 @@ def find_slips_between_reversals(
     kept = (piece[found.first] == piece[found.last]) & (samples[found.last] < end)
     first, last = found.first[kept], found.last[kept]
     shift = sliding.force - unfolded
+    period = found.period
+    if options.get("period") is None and not kept.all():
+        # Falls over a reversal are none of the setup.
+        period = fall_period(time[samples], unfolded, found.first[kept], found.last[kept])
     return replace(
         found,
+        period=period,
         start_time=found.start_time[kept],
         end_time=found.end_time[kept],
         force_before=sign[first] * (found.force_before[kept] + shift[first]),

@@ -62,6 +62,8 @@ def _enlarge_start(axes: Axes, solutions: Sequence[_Solution]) -> None:
     if not early or np.ptp(early[0].drop) > VISIBLE * max(np.ptp(one.drop) for one in solutions):
         return
     end, depth = ENLARGED * early[0].times[-1], ENLARGED * np.ptp(early[0].drop)
+    if not (end > 0 and depth > 0):
+        return
     time, force = scale_for(end, "s"), scale_for(depth, "N")
     inset = axes.inset_axes((0.66, 0.6, 0.34, 0.3))
     for one in solutions:

@@ -58,6 +58,7 @@ LONG_PAGES = [
     "how-to/quasi-static.md",
     "how-to/slide-hold-slide.md",
     "how-to/which-motion.md",
+    "interface.md",
     "measurements.md",
     "questions.md",
     "teaching.md",

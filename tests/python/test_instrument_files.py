@@ -151,3 +151,19 @@ def test_binary_files(name, tmp_path):
     file, write = BINARIES[name]
     write(tmp_path / file)
     check(mesoslip.read_trace(tmp_path / file))
+
+
+def test_a_lone_load_cell_pulls(tmp_path):
+    """As a lone load does; beside a friction force it presses."""
+    time = np.arange(0, 6, 0.01)
+    table = np.transpose([time, 5 * time, np.minimum(1, time % 3) + 1, 0 * time + 2])
+    for names, quantity in (
+        ("Time (s)\tStage (um)\tLoad cell (mN)", "spring_force"),
+        ("Time (s)\tStage (um)\tFriction force (mN)\tLoad cell (mN)", "normal_force"),
+    ):
+        path = tmp_path / f"{quantity}.txt"
+        columns = table[:, : names.count("\t") + 1]
+        np.savetxt(path, columns, delimiter="\t", header=names, comments="")
+        tree = mesoslip.read_trace(path)
+        assert "'Load cell (mN)' taken as" in tree.attrs["understood"]
+        assert tree[quantity].values.ravel()[-1] == pytest.approx(1e-3 * columns[-1, -1])

@@ -293,7 +293,7 @@ def _from_headings(table: Table, headings: Mapping[int, Heading], found: Assignm
     either = by_quantity.pop(EITHER, [])
     has_force = not found.used.keys().isdisjoint(FORCES)
     names = {index: bare_name(table.headers[index]) for index, one in headings.items() if one.unit}
-    loads = [index for index, name in names.items() if name == "load"]
+    loads = [index for index, name in names.items() if name in {"load", "load cell"}]
     is_normal = has_force or bool(set(FORCES) & by_quantity.keys())
     if len(loads) == 1 and "normal_force" not in by_quantity:
         # Beside a friction it presses, alone it pulls.

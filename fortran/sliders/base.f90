@@ -80,6 +80,8 @@ module mesoslip_sliders_base
       procedure(observe_interface), deferred :: observe
       procedure(energy_interface), deferred :: energy
       procedure, non_overridable :: pose
+      !> Add what changes the acceleration to a pose, for contacts that foresee the motion
+      procedure :: complete_pose
       procedure :: adapt_to_drive
       procedure :: can_pause
       procedure :: pulled_velocity
@@ -147,6 +149,13 @@ contains
          & self%follows_drive .and. abs(self%velocity) > 0.0_wp &
          & .and. .not. abs(self%acceleration) > 0.0_wp)
    end function pose
+
+   !> Add what changes the acceleration to a pose: it is unknown, for most sliders.
+   pure subroutine complete_pose(self, pose)
+      class(slider_type), intent(in) :: self
+      type(pose_type), intent(inout) :: pose
+
+   end subroutine complete_pose
 
    !> Adapt to a change of the drive: most sliders need not.
    subroutine adapt_to_drive(self)

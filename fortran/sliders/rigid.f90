@@ -5,7 +5,7 @@
 !> rounding. Times between events are short compared with any period of the system, so that a few
 !> terms are enough.
 module mesoslip_sliders_rigid
-   use mesoslip_interface_law, only: interface_law_type, window_type
+   use mesoslip_interface_law, only: interface_law_type, pose_type, window_type
    use mesoslip_numerics_archive, only: archive_type
    use mesoslip_numerics_errors, only: error_type
    use mesoslip_numerics_kinds, only: wp
@@ -34,6 +34,7 @@ module mesoslip_sliders_rigid
       procedure :: start
       procedure :: advance
       procedure :: run_ahead
+      procedure :: complete_pose
       procedure :: observe
       procedure :: energy
       procedure :: shift_origin
@@ -214,6 +215,17 @@ contains
       end if
       if (.not. is_done) call take_long_step(self, system, window, early)
    end subroutine take_step
+
+   pure subroutine complete_pose(self, pose)
+      class(slider_rigid_type), intent(in) :: self
+      type(pose_type), intent(inout) :: pose
+
+      pose%is_known = .true.
+      pose%driving = self%own_rate**2 * self%drive%rate_at(self%time)
+      pose%driving_rate = self%own_rate**2 * self%drive%acceleration
+      pose%damping = self%damping
+      pose%damper = self%damper
+   end subroutine complete_pose
 
    pure function observe(self, time) result(motion)
       class(slider_rigid_type), intent(in) :: self

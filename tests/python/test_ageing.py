@@ -576,6 +576,33 @@ def test_few_contacts_are_visited_before_any_breaks(klein):
         assert realization.finished
 
 
+@pytest.mark.parametrize("changes", [{}, {"contacts__thermal": {"rate": 1e4, "force_ratio": 0.02}}])
+def test_a_rigid_slider_hardly_stops_where_nothing_happens(klein, changes):
+    """Where it meets the threshold of one of few contacts follows from its equation of motion, so
+    there are two advances for a break and the birth after it. By its acceleration, and bounds on
+    what changes that, there are 2.6 and 2.7."""
+    config = klein(
+        run__duration=0.2,
+        drive={"velocity": 4.3e-3},
+        slider={"mass": 0.02, "stiffness": 1e3, "damping_ratio": 0.1},
+        contacts__count=80,
+        contacts__static_force=0.16,
+        contacts__stiffness=3e4,
+        contacts__delay=4e-5,
+        contacts__coupling="equal",
+        contacts__threshold__relative_width=0.11,
+        contacts__initial="steady",
+        contacts__ageing={"law": "log", "time": 1e-3, "growth": 5e-3},
+        output={"interval": 0.01},
+        **changes,
+    )
+    with Realization(config, 0) as realization:
+        while not realization.finished:
+            realization.advance()
+        assert realization.breaks > 5000
+        assert realization.advances < 2.2 * realization.breaks
+
+
 @pytest.mark.parametrize("count", [1, 5])
 def test_few_contacts_break_very_often(count):
     """The energy closes over hundreds of lives of each contact, in one steady motion."""

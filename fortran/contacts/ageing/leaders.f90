@@ -18,6 +18,8 @@ module mesoslip_contacts_ageing_leaders
 
    !> Contacts that are taken out of the queue together
    integer, parameter :: max_gathered = 16
+   !> Leaders that are extrapolated at once: a stop at the bound of another costs less than more
+   integer, parameter :: max_extrapolated = 4
 
 contains
 
@@ -59,6 +61,10 @@ contains
       do position = first, 1, -1
          key = self%leader_key(position)
          if (.not. key < upper) exit
+         if (first - position == max_extrapolated) then
+            upper = key
+            exit
+         end if
          if (key < reach) then
             contact = self%list(leaders)%contact(position)
             if (position < first .and. self%life(life_motion, contact) < any_motion) then

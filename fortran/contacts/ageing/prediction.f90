@@ -1,7 +1,8 @@
 !> Motion of a slider as contacts whose thresholds grow predict it, and where they meet it.
 !>
 !> Acceleration and jerk of the slider follow from the law that it is offered; a bound on the error
-!> of the jerk from recent motions, with a margin.
+!> of the jerk from recent motions, with a margin. Of a slider whose drive and damper are known, so
+!> does the rate of the jerk.
 module mesoslip_contacts_ageing_prediction
    use mesoslip_contacts_ageing_law, only: ageing_law_type
    use mesoslip_interface_law, only: interface_law_type, pose_type
@@ -32,8 +33,13 @@ module mesoslip_contacts_ageing_prediction
       !> Acceleration [m/s2] and jerk under it, the error of the jerk in recent motions, and a bound
       !> on its error [m/s3]
       real(wp) :: acceleration = 0.0_wp, jerk = 0.0_wp, jerk_error = 0.0_wp, jerk_bound = 0.0_wp
+      !> Whether the motion is known: then its next derivative [m/s4], and a bound on that after it
+      !> [m/s5]
+      logical :: is_known = .false.
+      real(wp) :: snap = 0.0_wp, crackle_bound = 0.0_wp
    contains
       procedure, non_overridable :: predict, compare, reach, extrapolate, shift, exchange
+      procedure, non_overridable, private :: displacement_error
    end type prediction_type
 
 contains
@@ -45,17 +51,25 @@ contains
       type(pose_type), intent(in) :: pose
       type(interface_law_type), intent(in) :: law
 
-      real(wp) :: change
+      real(wp) :: change, stiffness, loss, damper_rate
 
       change = (law%stiffness - self%law%stiffness) * pose%displacement &
          & - (law%offset - self%law%offset) + (law%drag - self%law%drag) * pose%velocity
       self%law = law
       self%acceleration = pose%acceleration - pose%inverse_mass * change
-      self%jerk = -(pose%own_rate**2 + pose%inverse_mass * law%stiffness) * pose%velocity &
-         & - pose%inverse_mass * law%drag * self%acceleration
+      stiffness = pose%own_rate**2 + pose%inverse_mass * law%stiffness
+      loss = pose%inverse_mass * law%drag + pose%damping
+      self%jerk = (pose%driving - stiffness * pose%velocity + pose%damping * pose%damper) &
+         & - loss * self%acceleration
       ! A drive or a damper may change as fast as the slider itself.
       self%jerk_bound = safety * self%jerk_error + min_jerk_error * abs(self%jerk) &
          & + pose%own_rate * (pose%own_rate * abs(pose%velocity) + abs(self%acceleration))
+      self%is_known = pose%is_known
+      damper_rate = pose%damping * (self%acceleration - pose%damper)
+      self%snap = pose%driving_rate + pose%damping * damper_rate &
+         & - stiffness * self%acceleration - loss * self%jerk
+      self%crackle_bound = safety * (pose%damping**2 * (abs(self%jerk) + abs(damper_rate)) &
+         & + stiffness * abs(self%jerk) + loss * abs(self%snap))
    end subroutine predict
 
    !> Compare a motion with its prediction.
@@ -92,8 +106,9 @@ contains
 
    !> Growth of a threshold until the slider meets it, not more than it is.
    !>
-   !> In a time t the slider moves by speed t + pull t^2 + third t^3, with an error that grows as
-   !> t^3, and the threshold grows by about rate t + bend t^2.
+   !> In a time t the slider moves by speed t + pull t^2 + third t^3 + fourth t^4, with an error
+   !> that grows as t^3 or, if the motion is known, as t^5; the threshold grows by about
+   !> rate t + bend t^2.
    pure subroutine extrapolate(self, ageing, rate, age, gap, speed, direction, resolution, growth, &
       & is_known)
       class(prediction_type), intent(in) :: self
@@ -108,7 +123,7 @@ contains
       real(wp), intent(inout) :: growth
       logical, intent(out) :: is_known
 
-      real(wp) :: bend, pull, third, error, later_rate, step, excess, slope, change
+      real(wp) :: bend, pull, third, fourth, error, later_rate, step, excess, slope, change
       integer :: number
 
       is_known = .false.
@@ -118,12 +133,14 @@ contains
       if (.not. step > 0.0_wp) return
       pull = 0.5_wp * direction * self%acceleration
       third = (1.0_wp / 6.0_wp) * direction * self%jerk
-      error = (1.0_wp / 6.0_wp) * self%jerk_bound * step**2
-      if (.not. (error < 0.5_wp * speed .and. (abs(pull) + abs(third) * step) * step &
-         & < 0.25_wp * speed)) return
+      fourth = 0.0_wp
+      if (self%is_known) fourth = (1.0_wp / 24.0_wp) * direction * self%snap
+      error = self%displacement_error(step)
+      if (.not. (error < 0.5_wp * speed .and. (abs(pull) + (abs(third) + abs(fourth) * step) &
+         & * step) * step < 0.25_wp * speed)) return
 
       bend = 0.5_wp * ageing%curvature(rate, age)
-      excess = (pull + third * step - bend) * step * slope
+      excess = (pull + (third + fourth * step) * step - bend) * step * slope
       if (abs(excess) <= max_excess .and. abs(bend) * step**3 &
          & <= 0.1_wp * resolution * ageing%time) then
          step = step * (1.0_wp - excess * (1.0_wp - 2.0_wp * excess))
@@ -132,9 +149,11 @@ contains
          if (abs(excess) < max_start_excess) step = step * (1.0_wp - excess)
          do number = 1, max_steps
             call ageing%grow(rate, age, step, growth, later_rate)
-            slope = speed + (2.0_wp * pull + 3.0_wp * third * step) * step - later_rate
+            slope = speed + (2.0_wp * pull + (3.0_wp * third + 4.0_wp * fourth * step) * step) &
+               & * step - later_rate
             if (.not. slope > 0.0_wp) return
-            change = (gap + growth - step * (speed + (pull + third * step) * step)) / slope
+            change = (gap + growth - step * (speed + (pull + (third + fourth * step) * step) &
+               & * step)) / slope
             step = max(0.0_wp, step + change)
             growth = growth + later_rate * change
             if (abs(change) <= max_change * step) exit
@@ -142,11 +161,24 @@ contains
          growth = max(growth, 0.0_wp)
          ! A slider that slows down arrives later than one at the present speed.
          slope = 1.0_wp / min(speed - rate, slope)
-         error = (1.0_wp / 6.0_wp) * self%jerk_bound * step**2
+         error = self%displacement_error(step)
       end if
       growth = max(0.0_wp, 1.0_wp - error * slope) * growth
       is_known = .true.
    end subroutine extrapolate
+
+   !> Bound on the error of the displacement that is predicted for a time [s], over that time [m/s].
+   pure function displacement_error(self, time) result(error)
+      class(prediction_type), intent(in) :: self
+      real(wp), intent(in) :: time
+      real(wp) :: error
+
+      if (self%is_known) then
+         error = (1.0_wp / 120.0_wp) * self%crackle_bound * time**4
+      else
+         error = (1.0_wp / 6.0_wp) * self%jerk_bound * time**2
+      end if
+   end function displacement_error
 
    !> Let the law that was offered count displacements from another origin.
    pure subroutine shift(self, distance)

@@ -2,7 +2,8 @@
 !>
 !> The exponent of a rate is a polynomial of time. Where it changes little in a step its exponential
 !> function is a short series, and the time of a reading follows from the reversion of the integral
-!> and a step or two of Newton's method.
+!> and a step or two of Newton's method. Where it changes more but nearly linearly, the function is
+!> that of the linear term, times a short series of the others.
 module mesoslip_sliders_hazard_series
    use mesoslip_interface_law, only: clocks, hazard_clock_type
    use mesoslip_numerics_kinds, only: wp
@@ -20,17 +21,23 @@ module mesoslip_sliders_hazard_series
    !> function is below 1e-15 of it
    integer, parameter :: short_terms = 4, short_order = 6
    real(wp), parameter :: max_short(short_terms) = [2.0e-2_wp, 1.0e-5_wp, 1.0e-7_wp, 1.0e-9_wp]
-   !> A middling step has a longer series, whose last coefficients show whether it is exact. Most
-   !> change the exponent less, and have one of a lower order
-   integer, parameter :: series_order = 14, low_order = 10, tail = 3
-   real(wp), parameter :: max_middling = 0.3_wp, max_low = 0.12_wp
+   !> A middling step has a longer series, whose last coefficients show whether it is exact
+   integer, parameter :: low_order = 10, tail = 3
+   real(wp), parameter :: max_low = 0.12_wp
    real(wp), parameter :: no_change = 1.0e-16_wp
-   real(wp), parameter :: max_tail(tail) = no_change, max_low_tail(tail) = no_change &
-      & * [1.0e4_wp, 1.0e2_wp, 1.0_wp]
+   real(wp), parameter :: max_tail(tail) = no_change * [1.0e4_wp, 1.0e2_wp, 1.0_wp]
    !> Bound on the mean of the exponential function over such a step, and one over it
    real(wp), parameter :: max_growth = 1.35_wp
-   !> Highest order of the exponent that changes the exponential function of a middling step
-   integer, parameter :: middling_terms = 12
+   !> Order of the series beside a linear exponent, and maximum change of that
+   integer, parameter :: bent_order = 12
+   real(wp), parameter :: max_linear = 2.0_wp
+   !> The same below which it hardly changes the first estimate of a time
+   real(wp), parameter :: min_linear = 1.0e-3_wp
+   !> Moment of that order over the exponential function at the end, in powers of minus the exponent
+   integer, parameter :: moment_terms = 12
+   integer :: i
+   real(wp), parameter :: moment(0:moment_terms - 1) = [(gamma(bent_order + 1.0_wp) &
+      & / gamma(bent_order + 2.0_wp + i), i=0, moment_terms - 1)]
 
 contains
 
@@ -80,15 +87,12 @@ contains
          exponent(term) = series(term - 1) * inverse(term) * length
          change = change + abs(exponent(term))
       end do
-      exponent(terms + 1:middling_terms) = 0.0_wp
-      ! The order is a constant in each call: the compiler makes a copy for each.
+      exponent(terms + 1:bent_order) = 0.0_wp
       is_done = change <= max_low
-      if (is_done) call advance_middling(clock, exponent, low_order, max_low_tail, step, ended_by, &
-         & is_done)
+      if (is_done) call advance_middling(clock, exponent, step, ended_by, is_done)
       if (is_done) return
-      is_done = change <= max_middling
-      if (is_done) call advance_middling(clock, exponent, series_order, max_tail, step, ended_by, &
-         & is_done)
+      is_done = abs(exponent(1)) <= max_linear
+      if (is_done) call advance_bent(clock, exponent, step, ended_by, is_done)
    end subroutine try_series
 
    pure subroutine advance_short(clock, exponent, step, ended_by)
@@ -121,37 +125,31 @@ contains
    end subroutine advance_short
 
    !> Advance by a middling step, unless the series does not converge.
-   pure subroutine advance_middling(clock, exponent, order, max_last, step, ended_by, is_done)
+   pure subroutine advance_middling(clock, exponent, step, ended_by, is_done)
       type(hazard_clock_type), intent(inout) :: clock(clocks)
       !> The exponent of the first clock, over a step of length 1
       real(wp), intent(in) :: exponent(max_terms)
-      !> Order of the series, and bounds on its last coefficients where it is exact
-      integer, intent(in) :: order
-      real(wp), intent(in) :: max_last(tail)
       real(wp), intent(inout) :: step
+      !> The clock that ends the step, or 0
       integer, intent(out) :: ended_by
       !> Whether it converges; if not, nothing has changed
       logical, intent(out) :: is_done
 
-      real(wp) :: time, part, direction, mean(0:series_order, clocks)
+      real(wp) :: time, part, mean(0:low_order, clocks)
       integer :: number
 
       ended_by = 0
       time = 1.0_wp
       do number = 1, clocks
          if (.not. clock(number)%is_used) cycle
-         direction = sign(1.0_wp, clock(number)%slope * clock(1)%slope)
-         if (order == low_order) then
-            mean(:low_order, number) = low_means(direction * exponent(:low_order))
-         else
-            mean(:, number) = long_means(direction * exponent(:middling_terms))
-         end if
-         is_done = all(abs(mean(order - tail + 1:order, number)) <= max_last)
+         mean(:, number) = low_means(sign(1.0_wp, clock(number)%slope * clock(1)%slope) &
+            & * exponent(:low_order))
+         is_done = all(abs(mean(low_order - tail + 1:, number)) <= max_tail)
          if (.not. is_done) then
             ended_by = 0
             return
          end if
-         part = time_of(mean(:, number), order, clock(number)%left, &
+         part = time_of(mean(:, number), low_order, clock(number)%left, &
             & clock(number)%rate * step, time)
          if (part > time) cycle
          time = part
@@ -160,10 +158,115 @@ contains
       is_done = .true.
       do number = 1, clocks
          if (clock(number)%is_used .and. number /= ended_by) clock(number)%elapsed &
-            & = clock(number)%rate * step * (time * horner(mean(:, number), order + 1, time))
+            & = clock(number)%rate * step * (time * horner(mean(:, number), low_order + 1, time))
       end do
       if (ended_by > 0) step = time * step
    end subroutine advance_middling
+
+   !> Advance by a step in which the exponent is nearly linear, unless it is not.
+   pure subroutine advance_bent(clock, exponent, step, ended_by, is_done)
+      type(hazard_clock_type), intent(inout) :: clock(clocks)
+      !> The exponent of the first clock, over a step of length 1
+      real(wp), intent(in) :: exponent(max_terms)
+      real(wp), intent(inout) :: step
+      !> The clock that ends the step, or 0
+      integer, intent(out) :: ended_by
+      !> Whether it is; if not, nothing has changed
+      logical, intent(out) :: is_done
+
+      real(wp) :: time, wanted, bent(0:bent_order, clocks), linear(clocks), reading(clocks)
+      integer :: number
+
+      ended_by = 0
+      time = 1.0_wp
+      do number = 1, clocks
+         if (.not. clock(number)%is_used) cycle
+         linear(number) = sign(1.0_wp, clock(number)%slope * clock(1)%slope)
+         bent(:, number) = bent_series(linear(number) * exponent(:bent_order))
+         linear(number) = linear(number) * exponent(1)
+         is_done = all(abs(bent(bent_order - tail + 1:, number)) <= max_tail)
+         if (.not. is_done) then
+            ended_by = 0
+            return
+         end if
+         reading(number) = bent_integral(linear(number), bent(:, number), time)
+         if (clock(number)%left > reading(number) * clock(number)%rate * step) cycle
+         wanted = clock(number)%left / (clock(number)%rate * step)
+         time = bent_time(linear(number), bent(:, number), wanted, reading(number), time)
+         ended_by = number
+      end do
+      is_done = .true.
+      do number = 1, clocks
+         if (.not. clock(number)%is_used .or. number == ended_by) cycle
+         if (ended_by > 0) reading(number) = bent_integral(linear(number), bent(:, number), time)
+         clock(number)%elapsed = clock(number)%rate * step * reading(number)
+      end do
+      if (ended_by > 0) step = time * step
+   end subroutine advance_bent
+
+   !> Exponential function of an exponent without its linear term, as a series.
+   pure function bent_series(e) result(g)
+      !> The exponent, over a step of length 1
+      real(wp), intent(in) :: e(bent_order)
+      real(wp) :: g(0:bent_order)
+
+      real(wp) :: slope(bent_order)
+      integer :: n, term
+
+      slope = [(real(term, wp), term=1, bent_order)] * e
+      g(:1) = [1.0_wp, 0.0_wp]
+      do n = 2, bent_order
+         g(n) = slope(n)
+         do term = n - 2, 2, -1
+            g(n) = g(n) + slope(term) * g(n - term)
+         end do
+         g(n) = inverse(n) * g(n)
+      end do
+   end function bent_series
+
+   !> Integral of exp(linear t) times a series from 0 to a time.
+   pure function bent_integral(linear, series, time) result(value)
+      real(wp), intent(in) :: linear, series(0:bent_order), time
+      real(wp) :: value
+
+      real(wp) :: growth, last, change, term(0:bent_order)
+      integer :: n
+
+      ! Moments of t**n from the highest down, by parts.
+      change = linear * time
+      growth = exp(change)
+      last = growth * horner(moment, moment_terms, -change)
+      term(bent_order) = series(bent_order) * last
+      do n = bent_order, 1, -1
+         last = (growth - change * last) * inverse(n)
+         term(n - 1) = series(n - 1) * last
+      end do
+      value = time * horner(term, bent_order + 1, time)
+   end function bent_integral
+
+   !> Time at which that integral has a value.
+   pure function bent_time(linear, series, wanted, whole, latest) result(time)
+      real(wp), intent(in) :: linear, series(0:bent_order)
+      !> The value, and that at a time which is not before
+      real(wp), intent(in) :: wanted, whole, latest
+      real(wp) :: time
+
+      real(wp) :: change, pace
+      integer :: iteration
+
+      ! As if the exponent were linear.
+      time = latest * (wanted / whole)
+      if (abs(linear * latest) > min_linear) time = log(1.0_wp + (exp(linear * latest) - 1.0_wp) &
+         & * (wanted / whole)) / linear
+      do iteration = 1, max_iterations
+         pace = exp(linear * time) * horner(series, bent_order + 1, time)
+         change = (bent_integral(linear, series, time) - wanted) / pace
+         change = change / max(0.5_wp, 1.0_wp - (0.5_wp * linear + series(2) * time) * change)
+         time = min(max(time - change, 0.0_wp), latest)
+         ! Halley's method, but for higher terms of the bend: the error is nearly cubic.
+         if (abs(change) <= converged * time) exit
+      end do
+   end function bent_time
 
    !> Coefficients of the mean of the exponential function since the start of a short step, side by
    !> side: exp(e_1 t) times the same of the other terms.
@@ -220,30 +323,6 @@ contains
          & inverse(6) * g_5, inverse(7) * g_6, inverse(8) * g_7, inverse(9) * g_8, &
          & inverse(10) * g_9, inverse(11) * g_10]
    end function low_means
-
-   !> The same of any middling step, by the same recurrence.
-   pure function long_means(e) result(mean)
-      !> The exponent, over a step of length 1
-      real(wp), intent(in) :: e(middling_terms)
-      real(wp) :: mean(0:series_order)
-
-      real(wp) :: g(0:series_order), slope(middling_terms), rest
-      integer :: n, term
-
-      do term = 1, middling_terms
-         slope(term) = term * e(term)
-      end do
-      g(0) = 1.0_wp
-      mean(0) = 1.0_wp
-      do n = 1, series_order
-         rest = 0.0_wp
-         do term = min(n, middling_terms), 2, -1
-            rest = rest + slope(term) * g(n - term)
-         end do
-         g(n) = inverse(n) * (rest + slope(1) * g(n - 1))
-         mean(n) = inverse(n + 1) * g(n)
-      end do
-   end function long_means
 
    !> Time at which a clock reaches its reading, in units of the step; huge if later than a bound.
    pure function time_of(mean, order, left, whole, latest) result(time)

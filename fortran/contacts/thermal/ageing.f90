@@ -276,10 +276,7 @@ contains
       call self%ageing%evaluate(self%age(age_limit, contact), self%mean_of(contact), age, here, &
          & rate)
       if (self%hazard%slope * (here - self%record(row_limit, contact)) > max_growth) then
-         call self%update_deviate(contact)
-         call self%take_out(contact)
-         call self%set_bound(contact, pose)
-         call self%put(contact)
+         call self%raise_limit(contact, here)
       end if
       call self%order(self%ahead)%remove(contact)
       self%age(age_bound, contact) = here

@@ -60,7 +60,8 @@ module mesoslip_contacts_thermal_keys
       !> ahead
       procedure :: bound, gather_ahead
       procedure, non_overridable :: put, insert, take_out, change_sign, clear_orders
-      procedure, non_overridable :: update_deviate, distance, move_reference, reverse_if_due
+      procedure, non_overridable :: update_deviate, raise_limit, distance, move_reference, &
+         & reverse_if_due
       procedure, non_overridable, private :: set_key
    end type thermal_keys_type
 
@@ -229,6 +230,20 @@ contains
          & self%life(life_key, contact), self%life(life_left, contact), &
          & self%record(row_limit, contact), self%record(row_origin, contact))
    end subroutine update_deviate
+
+   !> Raise the limit of a contact whose force is along the motion [m], and solve its key again. In
+   !> the order of the way back it stays where it was: there its force changes its sign.
+   subroutine raise_limit(self, contact, limit)
+      class(thermal_keys_type), intent(inout) :: self
+      integer, intent(in) :: contact
+      real(wp), intent(in) :: limit
+
+      call self%update_deviate(contact)
+      self%record(row_limit, contact) = limit
+      call self%set_key(contact)
+      call self%order(motions + int(self%life(life_clock, contact)))%put(contact, &
+         & self%life(life_key, contact))
+   end subroutine raise_limit
 
    !> Move the reference of a clock to the slider [m], if it is far or no contact belongs to the
    !> clock.

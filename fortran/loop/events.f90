@@ -21,6 +21,7 @@ contains
       type(window_type) :: window
 
       before = state%slider%pose()
+      call state%slider%complete_pose(before)
       call state%contacts%offer(before, law, window)
       if (is_broken(state, law, window)) then
          call finish(state, ending_broken)

@@ -80,7 +80,7 @@ module mesoslip_sliders_base
       procedure(observe_interface), deferred :: observe
       procedure(energy_interface), deferred :: energy
       procedure, non_overridable :: pose
-      !> Add what changes the acceleration to a pose: unknown, for most sliders
+      !> Add what changes the acceleration to a pose, for contacts that foresee the motion
       procedure :: complete_pose
       procedure :: adapt_to_drive
       procedure :: can_pause
@@ -151,7 +151,7 @@ contains
       call self%complete_pose(pose)
    end function pose
 
-   !> Add what changes the acceleration to a pose: unknown, for most sliders.
+   !> Add what changes the acceleration to a pose: it is unknown, for most sliders.
    pure subroutine complete_pose(self, pose)
       class(slider_type), intent(in) :: self
       type(pose_type), intent(inout) :: pose

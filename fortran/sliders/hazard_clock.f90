@@ -1,9 +1,9 @@
 !> Clocks of thermally activated breaking: the time in a motion at which one reaches a reading.
 !>
 !> The reading is the integral of exp(slope X) over the motion, which is a series of the velocity.
-!> In most steps between two events the exponent changes so little that the reading is a series in
-!> time, too. In others it is a Gauss rule over parts of a step so short that the rule is exact to
-!> rounding, and the time of a reading is found by Halley's method.
+!> In most steps between two events the exponent changes so little, or so nearly linearly, that the
+!> reading follows from a series in time, too. In others it is a Gauss rule over parts of a step so
+!> short that the rule is exact to rounding, and the time of a reading is found by Halley's method.
 module mesoslip_sliders_hazard_clock
    use mesoslip_interface_law, only: clocks, hazard_clock_type, window_type
    use mesoslip_numerics_kinds, only: wp

@@ -590,8 +590,8 @@ def test_few_contacts_are_visited_before_any_breaks(klein):
         assert realization.finished
 
 
-@pytest.mark.parametrize("thermal", [None, {"rate": 1e4, "force_ratio": 0.02}])
-def test_a_rigid_slider_hardly_stops_where_nothing_happens(klein, thermal):
+@pytest.mark.parametrize("changes", [{}, {"contacts__thermal": {"rate": 1e4, "force_ratio": 0.02}}])
+def test_a_rigid_slider_hardly_stops_where_nothing_happens(klein, changes):
     """Where it meets the threshold of one of few contacts follows from its equation of motion, so
     there are two advances for a break and the birth after it. By its acceleration, and bounds on
     what changes that, there are 2.6 and 2.7."""
@@ -607,8 +607,8 @@ def test_a_rigid_slider_hardly_stops_where_nothing_happens(klein, thermal):
         contacts__threshold__relative_width=0.11,
         contacts__initial="steady",
         contacts__ageing={"law": "log", "time": 1e-3, "growth": 5e-3},
-        contacts__thermal=thermal,
         output={"interval": 0.01},
+        **changes,
     )
     with Realization(config, 0) as realization:
         while not realization.finished:

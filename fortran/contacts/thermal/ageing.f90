@@ -275,8 +275,9 @@ contains
       age = pose%time - self%age(age_birth, contact)
       call self%ageing%evaluate(self%age(age_limit, contact), self%mean_of(contact), age, here, &
          & rate)
-      if (self%hazard%slope * (here - self%record(row_limit, contact)) > max_growth) &
-         & call self%raise_limit(contact, here)
+      if (self%hazard%slope * (here - self%record(row_limit, contact)) > max_growth) then
+         call self%raise_limit(contact, here)
+      end if
       call self%order(self%ahead)%remove(contact)
       self%age(age_bound, contact) = here
       key = self%direction * self%record(row_origin, contact) + here

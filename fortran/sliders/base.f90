@@ -148,7 +148,6 @@ contains
          & self%direction, self%inverse_mass, self%own_rate, &
          & self%follows_drive .and. abs(self%velocity) > 0.0_wp &
          & .and. .not. abs(self%acceleration) > 0.0_wp)
-      call self%complete_pose(pose)
    end function pose
 
    !> Add what changes the acceleration to a pose: it is unknown, for most sliders.

@@ -10,7 +10,7 @@ module mesoslip_contacts_populations_pinned
    use mesoslip_contacts_populations_rows, only: column_weight, compliant, moments_length, &
       & new_population_rows, number, stiff
    use mesoslip_contacts_populations_table_lives, only: new_table_lives, newborn_law
-   use mesoslip_contacts_populations_thermal, only: thermal_populations_type, joining_part
+   use mesoslip_contacts_populations_thermal, only: joining_part, thermal_populations_type
    use mesoslip_numerics_errors, only: error_type
    use mesoslip_numerics_kinds, only: wp
    implicit none
@@ -26,6 +26,9 @@ module mesoslip_contacts_populations_pinned
    real(wp), parameter :: track_part = 0.4_wp
    !> Stretch beyond which the cells of the initial states of wide laws grow with it
    real(wp), parameter :: min_even = 0.02_wp
+   !> Where only the displacement matters: that in which contacts join a population, over that of a
+   !> step, and broken part of it up to which they may
+   real(wp), parameter :: near_part = 0.125_wp, max_loss = 1.0e-3_wp
    !> Number of forces at attaching if they have a width, evenly spaced, and their range in standard
    !> deviations
    integer, parameter :: max_classes = 25
@@ -41,6 +44,9 @@ module mesoslip_contacts_populations_pinned
       real(wp) :: newborn_force = 0.0_wp
       !> Mean stiffness of a contact that touches [N/m]
       real(wp) :: touching_stiffness = 0.0_wp
+      !> Whether contacts that attach may join any population that attached close by, as it does not
+      !> matter when or at which strength
+      logical, private :: may_join_any = .false.
       !> Number of forces at attaching; for each the relative force, the threshold up to which no
       !> contact can attach with it, and the shares of contacts: before the rejection of these, not
       !> normalized and normalized, and after it
@@ -79,6 +85,7 @@ contains
       else
          call self%tabulate_moments()
       end if
+      self%may_join_any = .not. (self%has_table .or. self%has_track)
       call self%sum_newborns(1.0_wp)
    end subroutine new_pinned_populations
 
@@ -114,6 +121,7 @@ contains
       class(pinned_populations_type), intent(inout) :: self
       real(wp), intent(in) :: rate, width, resolution
 
+      self%may_join_any = .false.
       call self%set_activation(new_activation(rate, width, self%stretch), resolution)
       self%step = step_length(hypot(self%parameters%law%width, width), resolution, self%stretch)
    end subroutine activate
@@ -186,6 +194,7 @@ contains
       type(ageing_law_type), intent(in) :: ageing
 
       self%ages = .true.
+      self%may_join_any = .false.
       self%ageing = ageing
       self%some_fall = ageing%falls(self%moments(1)%min_threshold, 1.0_wp) &
          & .or. ageing%falls(self%moments(1)%max_threshold, 1.0_wp)
@@ -277,8 +286,8 @@ contains
       real(wp), intent(out) :: lost
       type(error_type), allocatable, intent(inout) :: error
 
-      real(wp) :: origin, force, mean_force
-      integer :: class
+      real(wp) :: origin, force, mean_force, moments(moments_length)
+      integer :: class, row
       logical :: joins
 
       call self%stiffness%add(self%newborn_stiffness * births)
@@ -292,7 +301,16 @@ contains
       do class = 1, self%classes
          force = direction * self%class_force(class)
          mean_force = force + 0.5_wp * (displacement - origin) / self%stretch
-         if (joins) then
+         row = 0
+         if (self%may_join_any) then
+            call self%moments(1)%interpolate(self%class_broken(class), moments)
+            if (moments(number) > 0.0_wp) row = self%row_to_join(origin, force, &
+               & near_part * self%step, (1.0_wp - max_loss) * moments(number))
+         end if
+         if (row > 0) then
+            call self%join(row, origin, self%share(class) * births * moments, displacement, time, &
+               & lost)
+         else if (joins) then
             call self%join_last(self%count - self%classes + class, origin, birth, &
                & births * self%newborn_share(class), mean_force, displacement, time, lost)
          else
@@ -303,7 +321,7 @@ contains
             if (self%is_thermal) call self%begin_hazard(self%count, time - birth, mean_force)
          end if
       end do
-      if (joins) return
+      if (joins .or. .not. self%is_thermal) return
       self%open_count = self%classes
       self%open_origin = origin
       self%open_direction = direction

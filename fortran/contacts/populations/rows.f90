@@ -65,6 +65,8 @@ module mesoslip_contacts_populations_rows
 
    !> Populations for which there is room at first
    integer, parameter :: initial_rows = 64
+   !> Number of the last populations among which there may be one to join
+   integer, parameter :: max_joined = 64
 
    !> Populations of pinned contacts.
    type :: population_rows_type
@@ -110,8 +112,9 @@ module mesoslip_contacts_populations_rows
       !> count or more), and those of the next one, shape (bins)
       real(wp), allocatable :: mix(:, :), newborn_mix(:)
    contains
-      procedure, non_overridable :: add, next_break, update_thresholds, sum_forces, shift_origin, &
-         & number_of_contacts, elastic_energy, scale_all, sum_bin, exchange
+      procedure, non_overridable :: add, row_to_join, join, next_break, update_thresholds, &
+         & sum_forces, shift_origin, number_of_contacts, elastic_energy, scale_all, sum_bin, &
+         & exchange
       procedure, non_overridable, private :: make_room, next_break_of_table
    end type population_rows_type
 
@@ -181,6 +184,57 @@ contains
          self%behind = max(self%behind, population(row, column_behind))
       end associate
    end subroutine add
+
+   !> The last population that contacts may join which attach with a force at an origin [m]: it
+   !> attached likewise within a distance [m], and no less than a part of its weight is left. 0 if
+   !> there is none.
+   pure function row_to_join(self, origin, force, distance, min_left) result(row)
+      class(population_rows_type), intent(in) :: self
+      real(wp), intent(in) :: origin, force, distance, min_left
+      integer :: row
+
+      do row = self%count, max(1, self%count - max_joined + 1), -1
+         if (abs(self%population(row, column_origin) - origin) > distance) cycle
+         if (abs(self%population(row, column_force) - force) > 0.0_wp) cycle
+         if (nint(self%population(row, column_law)) /= 1) cycle
+         if (self%left(number, row) >= min_left * self%population(row, column_weight)) return
+      end do
+      row = 0
+   end function row_to_join
+
+   !> Let contacts that attach at an origin [m] join a population of contacts alike.
+   subroutine join(self, row, origin, moments, displacement, time, energy)
+      class(population_rows_type), intent(inout) :: self
+      integer, intent(in) :: row
+      real(wp), intent(in) :: origin
+      !> Moments of these contacts
+      real(wp), intent(in) :: moments(moments_length)
+      !> Displacement of the slider [m], and time [s]
+      real(wp), intent(in) :: displacement, time
+      !> Elastic energy, to which that lost by giving all contacts one origin is added [J]
+      real(wp), intent(inout) :: energy
+
+      real(wp) :: all(moments_length), part, shift
+
+      associate (population => self%population, left => self%left(:, row))
+         ! Of the stiffnesses, so that the force stays the same.
+         part = moments(stiff) / (left(stiff) + moments(stiff))
+         shift = origin - population(row, column_origin)
+         energy = energy + 0.5_wp * self%parameters%stiffness * left(stiff) * part * shift**2 &
+            & + self%parameters%static_force * population(row, column_force) * shift &
+            & * (left(number) * part - moments(number) * (1.0_wp - part))
+         population(row, column_origin) = population(row, column_origin) + part * shift
+         if (allocated(self%mix)) self%mix(:, row) = self%mix(:, row) + moments(number) &
+            & / (left(number) + moments(number)) * (self%newborn_mix - self%mix(:, row))
+         left = left + moments
+         call self%moments(1)%interpolate(population(row, column_broken), all)
+         population(row, column_weight) = left(number) / all(number)
+         population(row, column_ahead) = max(displacement, self%next_break(row, 1.0_wp, time))
+         population(row, column_behind) = min(displacement, self%next_break(row, -1.0_wp, time))
+         self%ahead = min(self%ahead, population(row, column_ahead))
+         self%behind = max(self%behind, population(row, column_behind))
+      end associate
+   end subroutine join
 
    !> Make room for one more population.
    subroutine make_room(self, error)

@@ -27,7 +27,11 @@ two more criteria that only a simulation has: breaks of contacts, and the veloci
 """
 
 from mesoslip.analysis.sampled_slips.choice import SlipCounts
-from mesoslip.analysis.sampled_slips.ends import fall_period
-from mesoslip.analysis.sampled_slips.find import FoundSlips, estimated_period, find_slips
+from mesoslip.analysis.sampled_slips.find import (
+    FoundSlips,
+    estimated_period,
+    fall_period,
+    find_slips,
+)
 
 __all__ = ["FoundSlips", "SlipCounts", "estimated_period", "fall_period", "find_slips"]

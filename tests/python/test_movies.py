@@ -143,7 +143,7 @@ def test_the_load_of_ageing_contacts_is_that_of_the_moment():
     np.testing.assert_allclose(limits / limits[0], np.outer(grown / grown[0], np.ones(120)))
 
 
-@pytest.mark.parametrize("view", ["lattice", "contacts", long("layers")])
+@pytest.mark.parametrize("view", ["lattice", *map(long, ["contacts", "layers"])])
 def test_what_changes_in_a_frame_is_drawn_as_in_the_whole_figure(
     few_snapshots, layered, view, monkeypatch
 ):

@@ -220,7 +220,7 @@ def many_samples(count, realizations=1):
 
 
 @pytest.mark.parametrize("block", [2**20, 997])
-@pytest.mark.parametrize("against", ["time", "displacement"])
+@pytest.mark.parametrize("against", [long("time"), "displacement"])
 def test_a_line_shows_the_extremes_of_many_samples(monkeypatch, block, against):
     """Far fewer points than samples, all of them samples, none of the spikes lost."""
     monkeypatch.setattr(lines, "BLOCK", block)
@@ -330,7 +330,7 @@ NAMES = [
 
 # Runs that are drawn against something else than by default; make fuzz draws all of them so.
 # Those whose panels others have as well.
-LIKE_OTHERS = {"slow", "sliding", "no avalanche", "few", "no slip", "two samples"}
+LIKE_OTHERS = {"slow", "sliding", "no avalanche", "few", "no slip", "two samples", "me", "several"}
 SEEN = {("plain", "displacement"), ("layered", "drive")}
 
 

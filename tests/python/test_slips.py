@@ -183,7 +183,7 @@ def stages(*pairs: tuple[float, float]) -> dict[str, object]:
 
 
 def test_steps_of_smooth_sliding_are_no_slips(klein):
-    drive = stages((0.5, 1e-6), (0.5, 1e-5), (0.5, 2e-5), (0.5, 1e-5))
+    drive = stages((0.3, 1e-6), (0.3, 1e-5), (0.3, 2e-5), (0.3, 1e-5))
     tree = mesoslip.run(
         klein(
             run__duration=None,

@@ -6,6 +6,7 @@ import time
 
 import numpy as np
 import pytest
+from conftest import long
 from mesoslip.simulation.realization import Realization
 from oracles import frozen_law, stationary_force, uniforms
 from scipy import stats
@@ -76,7 +77,7 @@ def test_a_contact_is_drawn_by_the_two_deviates_of_its_key(klein, law, width, co
         assert stretch[contact] == pytest.approx(expected, rel=1e-12)
 
 
-@pytest.mark.parametrize("coupling", ["equal", "scaled"])
+@pytest.mark.parametrize("coupling", [long("equal"), "scaled"])
 @pytest.mark.parametrize("law", LAWS)
 def test_the_start_is_stationary(klein, law, coupling):
     """Thresholds, places between attaching and breaking, and the force, of 30 000 contacts."""

@@ -455,7 +455,7 @@ def assert_same_numbers(one: xr.Dataset, other: xr.Dataset) -> None:
 
 
 @pytest.mark.parametrize(
-    "executor", [mesoslip.Threads(2), mesoslip.Processes(2), *map(long, [mesoslip.Processes(1), 2])]
+    "executor", [mesoslip.Threads(2), *map(long, [mesoslip.Processes(1), mesoslip.Processes(2), 2])]
 )
 def test_the_executor_does_not_matter(executor, whole):
     data = mesoslip.sweep(tables(realizations=3), executor=executor)

@@ -219,7 +219,7 @@ def test_the_critical_stiffness_of_samples_is_that_of_their_law(klein, back, exa
     config = klein(
         contacts__coupling="equal",
         contacts__back_force_ratio=back,
-        contacts__threshold=two_peaks(3000, seed=3),
+        contacts__threshold=two_peaks(4000, seed=3),
         curve={"length": 3e-8},
     )
     curve = ForceCurve(config)
@@ -245,7 +245,7 @@ def test_the_force_of_many_samples_becomes_that_of_steady_sliding(klein):
 @pytest.fixture(scope="module")
 def few_samples():
     """The force curve of some samples of two peaks."""
-    law = two_peaks(80, seed=2)
+    law = two_peaks(150, seed=2)
     tables = klein_tables(contacts__threshold=law, curve={"length": 1.6e-8})
     return ForceCurve(Config.from_dict(tables))
 

@@ -69,6 +69,7 @@ def test_thresholds_that_do_not_grow_are_the_model_without_ageing():
     np.testing.assert_allclose(same, force(), rtol=0, atol=1e-8 * 18e-6)
 
 
+@pytest.mark.long
 def test_without_temperature_it_is_the_model_without():
     """The difference falls with f_T, to the errors of both."""
 

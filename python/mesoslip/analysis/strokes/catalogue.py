@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,7 +18,8 @@ from mesoslip.analysis.strokes.measure import MIDDLE, Measured, Stroke, measure_
 from mesoslip.analysis.strokes.record import StrokeRecord, record_of
 from mesoslip.analysis.strokes.revolutions import found_period, has_rotation, revolutions_of
 from mesoslip.analysis.strokes.variables import CYCLES, STROKES, unit_of
-from mesoslip.errors import ConfigError, FileError, Problem
+from mesoslip.configuration import arguments
+from mesoslip.errors import FileError
 from mesoslip.output.arrays import Tree
 from mesoslip.output.inputs import OutputLike, opened_run_arrays
 from mesoslip.output.table_files import PrintedTable
@@ -254,6 +254,12 @@ def strokes_from(tree: xr.DataTree) -> Strokes:
     return Strokes(columns, {}, tree.attrs["middle"], unit, tree.attrs["source"], notes)
 
 
+def _checked_period(value: object) -> object:
+    is_found = isinstance(value, str) and value == "auto"
+    return value if is_found else arguments.number(0, is_open=True)(value)
+
+
+@arguments.checked(middle=arguments.number(0, 1, is_open=True), period=_checked_period)
 def strokes(
     output: OutputLike, *, middle: float = MIDDLE, period: float | Literal["auto"] | None = None
 ) -> xr.DataTree:
@@ -295,9 +301,6 @@ def strokes(
     """
     import xarray as xr
 
-    check_middle("middle", middle)
-    if period not in {None, "auto"} and not 0 < float(period or 0) < math.inf:
-        raise ConfigError([Problem("", "period", "must be a time above 0", period)])
     with opened_run_arrays(output) as tree:
         found = strokes_of(tree, middle, period=period)
     groups: dict[str, xr.Dataset] = {}
@@ -317,9 +320,3 @@ def strokes(
     result = xr.DataTree.from_dict(groups)
     result.attrs.update(attributes)
     return result
-
-
-def check_middle(key: str, middle: float) -> None:
-    """Check that the middle is a share of a stroke."""
-    if not 0 < middle <= 1:
-        raise ConfigError([Problem("", key, "must be between 0 and 100 %", middle)])

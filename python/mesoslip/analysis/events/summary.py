@@ -144,7 +144,7 @@ class EventSummary:
 
 def check_catalogue(key: str, catalogue: str | None) -> None:
     """Check the name of a catalogue."""
-    if catalogue is not None and catalogue not in CATALOGUES:
+    if catalogue is not None and not (isinstance(catalogue, str) and catalogue in CATALOGUES):
         names = ", ".join(CATALOGUES)
         raise ConfigError([Problem("", key, f"must be one of {names}", catalogue)])
 

@@ -302,7 +302,7 @@ def _mean_of(values: Array) -> tuple[float, float]:
 
 def check_signal(key: str, signal: str | None) -> None:
     """Check the name of a signal."""
-    if signal is not None and signal not in SIGNALS:
+    if signal is not None and not (isinstance(signal, str) and signal in SIGNALS):
         raise ConfigError([Problem("", key, f"must be one of {', '.join(SIGNALS)}", signal)])
 
 

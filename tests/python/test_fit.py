@@ -540,6 +540,16 @@ def test_what_is_wrong_with_a_fit_is_reported(change, said):
         Plan.from_dict(tables)
 
 
+def test_changes_of_free_keys_are_refused(tmp_path):
+    """They had no effect: free keys are drawn."""
+    path = tmp_path / "fit.toml"
+    path.write_text(tomli_w.dumps(fit_tables()))
+    free = Plan.load(path).prior.free[0].key
+    with pytest.raises(ConfigError, match=rf"{free}: cannot be changed, as .* sets it"):
+        Plan.load(path, [f"{free}=1"])
+    assert Plan.load(path, ["fit.seed=7"]).seed == 7
+
+
 def test_a_fit_needs_a_table_and_a_trace(tmp_path, command):
     with pytest.raises(ConfigError, match="name the free keys"):
         Plan.from_dict(klein_tables())

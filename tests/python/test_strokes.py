@@ -334,8 +334,12 @@ def test_one_direction_has_no_strokes() -> None:
         mesoslip.strokes(record_tree(time, np.ones(100), drive_displacement=time))
     with pytest.raises(mesoslip.FileError, match="sign of the force"):
         mesoslip.strokes(record_tree(time, np.ones(100)))
-    with pytest.raises(mesoslip.ConfigError, match="middle"):
-        mesoslip.strokes(record_tree(time, np.ones(100)), middle=80)
+    for name, wrong in (("middle", 80), ("middle", "all"), ("period", [0]), ("period", "long")):
+        with pytest.raises(mesoslip.ConfigError, match=f"{name} = .* must be"):
+            mesoslip.strokes(record_tree(time, np.ones(100)), **{name: wrong})
+    for function, name in ((mesoslip.events, "catalogue"), (mesoslip.plateaus, "signal")):
+        with pytest.raises(mesoslip.ConfigError, match=f"{name} = .* must be one of"):
+            function(record_tree(time, np.ones(100)), **{name: np.zeros(2)})
 
 
 def test_the_sign_of_a_column_of_friction_is_by_its_unit(tmp_path) -> None:  # type: ignore[no-untyped-def]

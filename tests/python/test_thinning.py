@@ -9,7 +9,7 @@ import mesoslip
 import nptdms
 import numpy as np
 import pytest
-from mesoslip.errors import FileError
+from mesoslip.errors import ConfigError, FileError
 from mesoslip.measured import measured_record, thinning
 from mesoslip.measured.reading import blocks
 from mesoslip.measured.reading.source import bytes_of
@@ -162,6 +162,14 @@ def test_what_cannot_be_thinned(tmp_path):
     path = written(tmp_path / "b.csv", 1 + rng.random(COUNT))
     with pytest.raises(FileError, match=r"has \d samples at 0.01 Hz; a trace needs at least 4"):
         mesoslip.read_trace(path, rate="0.01 Hz")
+    for key, wrong in (("period", "1e308 s"), ("rate", "1e-200 Hz"), ("rate", 1e-308)):
+        with pytest.raises(ConfigError, match=rf"{key} = .* between 1e-30 and 1e\+30 .* in size"):
+            mesoslip.read_trace(path, **{key: wrong})
+    for low in ("1e-4 Hz", "1e-30 Hz"):
+        with pytest.raises(FileError, match=r"--rate is too low .* at least 0\.001 Hz"):
+            mesoslip.read_trace(path, rate=low)
+    for key, extreme in (("period", 1e30), ("period", 1e-30), ("rate", 1e30)):
+        assert mesoslip.read_trace(path, **{key: extreme}).sizes["time"] == COUNT
     empty = written(tmp_path / "c.csv", np.full(9, np.nan), TIME[:9])
     with pytest.raises(FileError, match="has 0 samples beside 9 without time or force"):
         mesoslip.read_trace(empty)

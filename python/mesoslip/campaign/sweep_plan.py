@@ -21,7 +21,7 @@ from mesoslip.campaign.sweep_axes import axes_of
 from mesoslip.campaign.sweep_table import MAX_POINTS, SweepFile
 from mesoslip.campaign.user_measures import find_measures
 from mesoslip.configuration.config import Config
-from mesoslip.configuration.differences import by_dotted_key
+from mesoslip.configuration.differences import check_changes
 from mesoslip.configuration.files import Change, Merged, on_base, override, read_toml
 from mesoslip.configuration.messages import problems
 from mesoslip.configuration.reading import PathLike, as_path
@@ -70,21 +70,11 @@ class Plan:
         """A sweep from its file and the base of that, with changes."""
         path, overrides = Path(path), list(overrides)
         plan = cls(override(read_toml(path), overrides).tables, str(path), path.parent)
-        plan._check_changes(by_dotted_key(override(Merged({}), overrides).tables))
+        setters = {key: "the table [sweep]" for axis in plan.axes for key in axis.keys}
+        if plan.sweep.realizations is not None:
+            setters["run.realizations"] = "sweep.realizations"
+        check_changes(overrides, setters, str(path))
         return plan
-
-    def _check_changes(self, changed: Iterable[str]) -> None:
-        """Refuse changes without an effect, of keys that the sweep sets."""
-        keys = {key: "the table [sweep] varies it" for axis in self.axes for key in axis.keys}
-        if self.sweep.realizations is not None:
-            keys["run.realizations"] = "sweep.realizations sets it"
-        found = [
-            Problem(self._source, key, f"cannot be changed: {keys[key]}; change that instead")
-            for key in changed
-            if key in keys
-        ]
-        if found:
-            raise ConfigError(found)
 
     @classmethod
     def from_dict(cls, tables: Mapping[str, Any], source: str = "sweep") -> Plan:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple, Protocol
 
 from mesoslip.configuration.config import Config
+from mesoslip.configuration.files import Change, Merged, override
 from mesoslip.configuration.keys import key_kind
+from mesoslip.errors import ConfigError, Problem
 from mesoslip.quantities import number, scale_for, with_unit
 
 # Maximum number of characters of a value.
@@ -65,6 +67,18 @@ def by_dotted_key(tables: Mapping[str, Any], outer: str = "") -> dict[str, Any]:
         else:
             values[outer + name] = value
     return values
+
+
+def check_changes(changes: Iterable[Change], setters: Mapping[str, str], source: str) -> None:
+    """Refuse changes without an effect, of keys that something else sets: its name by key."""
+    changed = by_dotted_key(override(Merged({}), changes).tables)
+    found = [
+        Problem(source, key, f"cannot be changed, as {setters[key]} sets it; change that instead")
+        for key in changed
+        if key in setters
+    ]
+    if found:
+        raise ConfigError(found)
 
 
 def text_of(key: str, value: Any) -> str:

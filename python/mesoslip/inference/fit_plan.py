@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from mesoslip.configuration.config import Config
+from mesoslip.configuration.differences import check_changes
 from mesoslip.configuration.files import Change, Merged, on_base, override, read_toml, undotted
 from mesoslip.configuration.keys import key_kind, nearest_keys
 from mesoslip.configuration.units import to_si
@@ -97,10 +98,13 @@ class Plan:
 
         Known properties of the apparatus according to the traces replace missing keys.
         """
-        path = Path(path)
+        path, overrides = Path(path), list(overrides)
         merged = read_toml(path)
         tables = override(_nested(merged), overrides).tables
-        return cls._checked(tables, str(path), known, merged.base)
+        plan = cls._checked(tables, str(path), known, merged.base)
+        setters = {one.key: "the table [fit.free]" for one in plan.prior.free}
+        check_changes(overrides, setters, str(path))
+        return plan
 
     @classmethod
     def from_dict(

@@ -18,6 +18,9 @@ from mesoslip.configuration.table import Table, Text, Whole, problem
 from mesoslip.configuration.units import is_number, number_of, text_to_si, to_si
 from mesoslip.errors import ConfigError, Problem, shown
 
+# Maximum size of a quantity in SI, so that what is derived from it does not overflow.
+MAX_SIZE = 1e30
+
 
 def _checked_quantity(
     value: object, units: tuple[str, ...], example: str, minimum: float | None, is_open: bool
@@ -36,6 +39,8 @@ def _checked_quantity(
             continue
         if minimum is not None and (number < minimum or (is_open and number == minimum)):
             raise ValueError(f"must be {'greater than' if is_open else 'at least'} {minimum:g}")
+        if number != 0 and not 1 / MAX_SIZE <= abs(number) <= MAX_SIZE:
+            raise ValueError(f"must be between {1 / MAX_SIZE:g} and {MAX_SIZE:g} {unit} in size")
         # A plain number for a force or a coefficient has the unit of the record.
         named = "" if len(units) > 1 else f" {unit}"
         return value if isinstance(value, str) else f"{number!r}{named}"

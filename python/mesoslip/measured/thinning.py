@@ -21,6 +21,8 @@ from mesoslip.quantities import number
 
 # Half the length of the filter over the number of samples for each that is kept.
 HALF_LENGTH = 10
+# Maximum number of samples for each that is kept, with a filter of 160 MB.
+MAX_EVERY = 10**6
 # Shape of Kaiser's window, and the frequency of half amplitude over half of the new rate.
 BETA, CUTOFF = 8.0, 0.75
 # Minimum interval of a gap over the usual one, and maximum share of gaps.
@@ -41,6 +43,9 @@ def thinned(blocks: Iterator[Table], rate: float, assigned: Callable[[Table], As
         raise FileError(f"{first.path}: its times do not increase; --rate thins a regular record")
     interval = float(known[-1] - known[0]) / (known.size - 1)
     every = round(1 / (rate * interval * time.size))
+    if every > MAX_EVERY:
+        lowest = number(1 / (MAX_EVERY * interval * time.size), 3)
+        raise FileError(f"{first.path}: --rate is too low for its samples: at least {lowest} Hz")
     if every < 2:
         recorded = number(1 / (interval * time.size), 5)
         note = f"not thinned: recorded at {recorded} Hz, less than twice --rate"

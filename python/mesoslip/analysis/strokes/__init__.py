@@ -1,12 +1,7 @@
 """Strokes of a record that goes back and forth: pieces between its reversals, slips in them, and
 measured properties of strokes and cycles."""
 
-from mesoslip.analysis.strokes.catalogue import (
-    Strokes,
-    strokes,
-    strokes_from,
-    strokes_of,
-)
+from mesoslip.analysis.strokes.catalogue import Strokes, strokes, strokes_from, strokes_of
 from mesoslip.analysis.strokes.friction_map import FrictionMap, along, friction_map, place_of
 from mesoslip.analysis.strokes.revolutions import found_period, has_rotation
 from mesoslip.analysis.strokes.segments import (

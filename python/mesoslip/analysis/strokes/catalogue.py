@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -18,7 +17,8 @@ from mesoslip.analysis.strokes.measure import MIDDLE, Measured, Stroke, measure_
 from mesoslip.analysis.strokes.record import StrokeRecord, record_of
 from mesoslip.analysis.strokes.revolutions import found_period, has_rotation, revolutions_of
 from mesoslip.array_types import DataTree
-from mesoslip.errors import ConfigError, FileError, Problem
+from mesoslip.configuration import arguments
+from mesoslip.errors import FileError
 from mesoslip.output.arrays import Tree
 from mesoslip.output.inputs import OutputLike, opened_run_arrays
 from mesoslip.output.table_files import PrintedTable, rows_of, write_tables
@@ -265,6 +265,12 @@ def strokes_from(tree: DataTree) -> Strokes:
     return Strokes(columns, {}, tree.attrs["middle"], unit, tree.attrs["source"], notes)
 
 
+def _checked_period(value: object) -> object:
+    is_found = isinstance(value, str) and value == "auto"
+    return value if is_found else arguments.number(0, is_open=True)(value)
+
+
+@arguments.checked(middle=arguments.number(0, 1, is_open=True), period=_checked_period)
 def strokes(
     output: OutputLike, *, middle: float = MIDDLE, period: float | Literal["auto"] | None = None
 ) -> DataTree:
@@ -314,10 +320,6 @@ def strokes(
     """
     import xarray as xr
 
-    if not 0 < middle <= 1:
-        raise ConfigError([Problem("", "middle", "must be between 0 and 100 %", middle)])
-    if period not in {None, "auto"} and not 0 < float(period or 0) < math.inf:
-        raise ConfigError([Problem("", "period", "must be a time above 0", period)])
     with opened_run_arrays(output) as tree:
         found = strokes_of(tree, middle, period=period)
     groups = {

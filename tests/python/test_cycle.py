@@ -14,8 +14,9 @@ from mesoslip.cycles import branch
 from mesoslip.cycles.branch import adapted
 from mesoslip.cycles.coordinates import PINNED, SLIDER, Coordinates
 from mesoslip.cycles.cycle import _cycle_of, master_equation
-from mesoslip.cycles.section import Motion
-from mesoslip.cycles.settling import Settled, _Settling
+from mesoslip.cycles.decay import Batch
+from mesoslip.cycles.section import Motion, Passage
+from mesoslip.cycles.settling import Settled, _Settling, settle
 from mesoslip.simulation.archive import Archive
 from mesoslip.theory.contacts import contact_theory
 from mesoslip.theory.contacts.plain_sliding import SteadySliding
@@ -176,7 +177,47 @@ def test_smooth_sliding_and_irregular_motion_are_told_apart():
     assert irregular.spread > 0.02
     assert sum(irregular.durations) < irregular.followed
     assert "stays irregular for" in irregular.verdict
+    assert f"confirmed in {irregular.cycles} at resolution 0.25" in irregular.verdict
+    assert irregular.coarse_cycles > irregular.cycles
     assert irregular.is_stable is None
+
+
+def test_a_closed_cycle_is_not_irregular_though_long_steps_say_so(regular, monkeypatch):
+    def settled(motion, *arguments, **options):
+        found = settle(motion, *arguments, **options)
+        if motion.config.run.resolution < 1:
+            return found
+        peak, low = found.rows[-1, 1:]
+        batch = Batch(0.0, peak - low, 0.1 * peak, is_linear=False)
+        return dataclasses.replace(found, motion="irregular", batches=[batch] * 3)
+
+    monkeypatch.setattr(mesoslip.cycles.cycle, "settle", settled)
+    found = mesoslip.cycle(configuration(), find_multipliers=False)
+    assert found.motion == "periodic"
+    assert found.period == pytest.approx(regular.period, rel=2e-5)
+
+
+def test_a_cycle_that_settles_slowly_is_not_irregular(regular):
+    """Period and peaks alternate, less and less; the mean amplitude stays the same throughout."""
+
+    class Made(Motion):
+        number = 0
+
+        def next_passage(self, words, _level):
+            self.number += 1
+            trace = regular._trace.copy()
+            trace["spring_force"] *= 1 + 0.02 * (-0.93) ** self.number
+            end = self.number * regular.period
+            return Passage(words, end - regular.period, end, trace, trace[:0])
+
+        def advance(self, words, _duration):
+            return words, regular._trace
+
+    batch = Batch(0.0, regular.amplitude, 0.01 * regular.amplitude, is_linear=False)
+    made = Made(regular.config)
+    found = settle(made, regular.state, regular.section, batches=[batch] * 2, is_stable=False)
+    assert found.motion == "periodic"
+    assert made.number > 40
 
 
 def test_a_state_is_the_same_after_taking_it_apart(regular):

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import math
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from mesoslip.configuration import arguments
 from mesoslip.configuration.config import Config
 from mesoslip.cycles.cycle_result import Cycle
+from mesoslip.cycles.decay import Batch
 from mesoslip.cycles.section import Level, Motion
 from mesoslip.cycles.settling import (
     MAX_CYCLES,
@@ -22,7 +24,7 @@ from mesoslip.cycles.settling import (
     settle,
     variation_after,
 )
-from mesoslip.errors import ConfigError, FileError, Problem
+from mesoslip.errors import ConfigError, FileError, Problem, RunError
 from mesoslip.output.inputs import ConfigLike, OutputLike, as_config, open_output
 from mesoslip.simulation.kernel import Words
 from mesoslip.simulation.recorded_tables import TRACE_COLUMNS, structured
@@ -37,6 +39,8 @@ CHANGE, MAX_STEPS, MULTIPLIER_ERROR = 3e-3, 6, 0.02
 MODULATION, CYCLES_AFTER = 0.01, 20
 # A duration without bound [s].
 LONG = 1e9
+# Resolution at which a motion settles first, and maximum resolution for which it does.
+COARSE, MAX_FINE = 1.0, 0.5
 # Initial states, by name.
 STARTS = ("relaxed", "steady", "uniform")
 
@@ -109,6 +113,7 @@ def cycle(
         tolerance=tolerance,
         max_cycles=max_cycles,
         find_multipliers=find_multipliers,
+        begins_coarse=words is None,
         progress=progress,
     )
 
@@ -121,22 +126,45 @@ def settled_cycle(
     tolerance: float = TOLERANCE,
     max_cycles: int = MAX_CYCLES,
     find_multipliers: bool = True,
+    begins_coarse: bool = False,
     progress: Callable[[float], None] | None = None,
 ) -> Cycle:
-    """The settled cycle from a state, for a configuration of `master_equation`; see `cycle`."""
+    """The settled cycle from a state, for a configuration of `master_equation`; see `cycle`.
+
+    From the start of a run it may settle at a coarse resolution first.
+    """
     motion = Motion(config)
     sliding = steady_sliding(config, MAX_WORK)
     is_stable = None if sliding is None else sliding.is_stable
-    settled = settle(
-        motion,
-        words,
-        level,
-        is_stable=is_stable,
-        root=None if sliding is None else sliding.leading_root,
-        tolerance=tolerance,
-        max_cycles=max_cycles,
-        progress=progress,
-    )
+    root = None if sliding is None else sliding.leading_root
+
+    def settled_at(
+        motion: Motion, words: Words | None, level: Level | None, batches: Sequence[Batch]
+    ) -> Settled:
+        return settle(
+            motion,
+            words,
+            level,
+            batches=batches,
+            is_stable=is_stable,
+            root=root,
+            tolerance=tolerance,
+            max_cycles=max_cycles,
+            progress=progress,
+        )
+
+    coarse, is_continued = None, words is not None
+    batches: Sequence[Batch] = ()
+    if begins_coarse and config.run.resolution <= MAX_FINE:
+        with contextlib.suppress(RunError):
+            coarse = settled_at(Motion(_coarse(config)), None, None, ())
+        # Steps that are too long may let an oscillation decay.
+        if coarse is not None and coarse.motion == "smooth":
+            coarse = None
+    if coarse is not None:
+        words, level = coarse.words, coarse.level
+        batches = coarse.batches if coarse.motion == "irregular" else ()
+    settled = settled_at(motion, words, level, batches)
     found: tuple[complex, ...] = ()
     steps, variation = 0, math.nan
     if find_multipliers and settled.motion == "periodic":
@@ -148,7 +176,19 @@ def settled_cycle(
             variation = variation_after(motion, settled, MODULATION, CYCLES_AFTER)
             steps += CYCLES_AFTER
     cycle = _cycle_of(config, settled, found, is_stable, steps, variation)
-    return dataclasses.replace(cycle, is_continued=words is not None)
+    if coarse is not None:
+        cycle = dataclasses.replace(
+            cycle,
+            coarse_cycles=coarse.cycles,
+            followed=cycle.followed + coarse.followed,
+            solver=f"{cycle.solver}, after {coarse.cycles} passages at resolution {COARSE:g}",
+        )
+    return dataclasses.replace(cycle, is_continued=is_continued)
+
+
+def _coarse(config: Config) -> Config:
+    """The configuration at the coarse resolution."""
+    return config.adapted(lambda one: one.replace({"run.resolution": COARSE}))
 
 
 def _cycle_of(

@@ -117,6 +117,9 @@ class Cycle:
     state: Words = field(repr=False)
     section: Level | None = field(repr=False)
     _trace: Trace = field(repr=False)
+    coarse_cycles: int = 0
+    """Number of passages computed before at a coarse resolution, from whose end the motion starts.
+    It is decided there that a motion is irregular, and confirmed in ``cycles`` passages."""
     is_continued: bool = False
     """Whether it started from the state of an earlier cycle."""
 
@@ -233,6 +236,11 @@ class Cycle:
             oscillation = (
                 f"the motion stays irregular for {duration}, with a mean amplitude of {percent}"
             )
+            if self.coarse_cycles:
+                oscillation += (
+                    f" ({self.coarse_cycles} passages with long steps, confirmed in {self.cycles} "
+                    f"at resolution {self.config.run.resolution:g})"
+                )
         else:
             passages = f" of {self.multiple} passages" if self.multiple > 1 else ""
             oscillation = f"the motion settles to a cycle{passages} with an amplitude of {percent}"

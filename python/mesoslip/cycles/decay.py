@@ -8,6 +8,7 @@ that double from one batch to the next.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -54,9 +55,13 @@ class Amplitudes:
         self._velocity = velocity
         self._root = root if root is not None and root.real < 0 < root.imag else None
         self._needed = MIN_BATCHES_UNSTABLE if is_stable is False else MIN_BATCHES_STABLE
-        self._batches: list[Batch] = []
+        self.batches: list[Batch] = []
         self._rows: list[tuple[float, float, bool]] = []
         self._first = 0
+
+    def continue_after(self, batches: Sequence[Batch]) -> None:
+        """Begin after batches of another motion; at least one more is needed."""
+        self.batches = list(batches[1 - self._needed :])
 
     def restart(self) -> None:
         """Begin another series of passages, as the section or the state has been replaced."""
@@ -91,25 +96,28 @@ class Amplitudes:
         """Make a batch of the passages since the last one."""
         times, sizes, is_linear = self._columns(self._rows[len(self._rows) // 2 :])
         error = float(np.std(sizes)) / math.sqrt(len(sizes))
-        self._batches.append(
+        self.batches.append(
             Batch(float(np.mean(times)), float(np.mean(sizes)), error, bool(np.all(is_linear[1:])))
         )
         self._rows, self._first = [], 0
 
     def fall_between_batches(self) -> bool:
         """Whether the amplitude falls from the last batch to this one as in linear theory."""
-        if len(self._batches) < 2 or not all(one.is_linear for one in self._batches[-2:]):
+        if len(self.batches) < 2 or not all(one.is_linear for one in self.batches[-2:]):
             return False
-        early, late = self._batches[-2:]
+        early, late = self.batches[-2:]
         fall = math.log(late.mean / early.mean)
         error = math.hypot(early.error / early.mean, late.error / late.mean)
         return -fall > STANDARD_ERRORS * error and self._is_rate(fall / (late.time - early.time))
 
+    @property
+    def are_all(self) -> bool:
+        """Whether there are no further batches."""
+        return len(self.batches) >= MAX_BATCHES
+
     def stay(self) -> bool:
-        """Whether the mean amplitude stays the same, or there are no further batches."""
-        if len(self._batches) == MAX_BATCHES:
-            return True
-        last, *before = self._batches[: -self._needed - 1 : -1]
+        """Whether the mean amplitude stays the same."""
+        last, *before = self.batches[: -self._needed - 1 : -1]
         return len(before) == self._needed - 1 and all(
             abs(one.mean - last.mean)
             < EQUAL_MEANS * last.mean + STANDARD_ERRORS * math.hypot(last.error, one.error)
@@ -118,7 +126,7 @@ class Amplitudes:
 
     def pause(self, loading_time: float) -> float:
         """Time until the next batch [s]."""
-        return BATCH_LOADINGS * loading_time * 2.0 ** (len(self._batches) - 1)
+        return BATCH_LOADINGS * loading_time * 2.0 ** (len(self.batches) - 1)
 
     def _is_rate(self, rate: float) -> bool:
         if self._root is None or rate >= 0:

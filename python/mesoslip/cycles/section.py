@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import chain
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -161,20 +162,24 @@ class Motion:
         reached."""
         start = time_of(words)
         kernel = self.open(words)
-        pieces: list[_Piece] = []
+        pieces = [_Piece(words, start, [], [])]
         limit = start + MAX_LOADINGS * self.loading_time + MAX_PERIODS * self.setup_period
         search = _PassageSearch(level)
         now = start
         while now < limit:
             kernel.advance(CHUNK, ANY_WORK)
-            pieces.append(_Piece(words, now, *_taken(kernel)))
-            found = search.passage_time(pieces[-1].trace)
+            trace, slips = _taken(kernel)
+            pieces[-1].traces.append(trace)
+            pieces[-1].slips.append(slips)
+            found = search.passage_time(trace)
             if found is not None:
                 kernel.close()
                 while pieces[-1].time >= found:
                     pieces.pop()
                 return self._cut(start, found, pieces)
-            words, now = kernel.save(), kernel.ask().time
+            now = kernel.ask().time
+            if search.has_been_low:
+                pieces.append(_Piece(kernel.save(), now, [], []))
         kernel.close()
         return None
 
@@ -184,13 +189,15 @@ class Motion:
         kernel = self.open(last.words, time)
         while not kernel.ask().ending:
             kernel.advance(CHUNK, ANY_WORK)
-        pieces.append(_Piece(last.words, last.time, *_taken(kernel)))
+        trace, slips = _taken(kernel)
+        traces = [*chain.from_iterable(one.traces for one in pieces), trace]
+        catalogues = [*chain.from_iterable(one.slips for one in pieces), slips]
         return Passage(
             self._saved(kernel),
             start,
             time,
-            structured(np.concatenate([one.trace for one in pieces]), TRACE_COLUMNS),
-            structured(np.concatenate([one.slips for one in pieces]), SLIP_COLUMNS),
+            structured(np.concatenate(traces), TRACE_COLUMNS),
+            structured(np.concatenate(catalogues), SLIP_COLUMNS),
         )
 
 
@@ -201,12 +208,12 @@ def _taken(kernel: Kernel) -> tuple[Array, Array]:
 
 
 class _Piece(NamedTuple):
-    """A chunk of a motion: the state and the time [s] at its start, samples and slips."""
+    """A part of a motion: the state and the time [s] at its start, samples and slips."""
 
     words: Words
     time: float
-    trace: Array
-    slips: Array
+    traces: list[Array]
+    slips: list[Array]
 
 
 class _PassageSearch:
@@ -214,7 +221,8 @@ class _PassageSearch:
 
     def __init__(self, level: Level) -> None:
         self._level = level
-        self._was_low = False
+        # Whether the force has been below the level from which it may pass.
+        self.has_been_low = False
         self._last: Array = np.empty((0, len(TRACE_COLUMNS)))
 
     def passage_time(self, rows: Array) -> float | None:
@@ -223,11 +231,11 @@ class _PassageSearch:
         self._last = rows[-1:]
         force = rows[:, FORCE]
         first = 0
-        if not self._was_low:
+        if not self.has_been_low:
             low = np.flatnonzero(force < self._level.reset)
             if not low.size:
                 return None
-            self._was_low, first = True, int(low[0])
+            self.has_been_low, first = True, int(low[0])
         above = np.flatnonzero(force[first:] >= self._level.force)
         if not above.size:
             return None

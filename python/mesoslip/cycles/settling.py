@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from mesoslip.array_types import Array
 from mesoslip.cycles.coordinates import Coordinates
-from mesoslip.cycles.decay import Amplitudes
+from mesoslip.cycles.decay import Amplitudes, Batch
 from mesoslip.cycles.section import Level, Motion, Passage, Trace, time_of
 from mesoslip.errors import RunError
 from mesoslip.simulation.kernel import Words
@@ -25,13 +25,17 @@ from mesoslip.simulation.kernel import Words
 MAX_MULTIPLE = 4
 # Relative error of period and peaks at which a cycle is settled, and maximum number of cycles.
 TOLERANCE, MAX_CYCLES = 1e-5, 80
+# Changes over the tolerance in the last two cycles up to which one is settled: one change may be
+# small by accident.
+MAX_CHANGE = 10.0
 # Relative spread of period and peaks over a number of last passages below which a motion that has
 # not settled is periodic: steps of the solver, or a fine structure, may keep it from settling.
 MAX_SPREAD, SPREAD_PASSAGES = 2e-3, 24
 # Passages in a later batch over those in the first one.
 BATCH_PART = 0.5
-# Ratio of successive changes below which they shrink.
-SHRINKING = 0.98
+# Ratio of successive changes below which they shrink; median of the changes in the last third of a
+# batch over that in the first third, below which its motion settles.
+SHRINKING, SETTLING = 0.98, 0.5
 # Ratios up to which spreads and changes of cycles of different lengths count as equal; the shorter
 # cycle is then chosen. A true cycle of several passages has much smaller ones than a shorter cycle.
 EQUAL_SPREAD, EQUAL_CHANGE = 3.0, 10.0
@@ -71,6 +75,8 @@ class Settled:
     rows: Array
     """Duration [s], maximum and minimum of the spring force [N] of all passages of this section,
     shape (passages, 3)."""
+    batches: Sequence[Batch] = ()
+    """Mean amplitudes of earlier passages, if it did not settle in them."""
 
 
 def settle(
@@ -78,6 +84,7 @@ def settle(
     words: Words | None = None,
     level: Level | None = None,
     *,
+    batches: Sequence[Batch] = (),
     is_stable: bool | None = None,
     root: complex | None = None,
     tolerance: float = TOLERANCE,
@@ -89,9 +96,11 @@ def settle(
 
     Stability of smooth sliding and leading root [1/s] may be unknown. The tolerance is the relative
     error of period and peaks. After ``max_cycles`` passages a motion that has not settled is
-    compared with itself later. ``progress`` is called with the passages over that number.
+    compared with itself later, and with the batches of a motion that led to the state and did not
+    settle at a coarse resolution. ``progress`` is called with the passages over that number.
     """
     run = _Settling(motion, is_stable, root, tolerance, 0.0 if words is None else time_of(words))
+    run.continue_after(batches, max_cycles)
     if words is None or level is None:
         words, trace = motion.advance(words, run.window)
         level = run.level_of(trace)
@@ -129,6 +138,16 @@ class _Settling:
         self._limit = 0
         self._level: Level | None = None
         self._restart()
+
+    def continue_after(self, batches: Sequence[Batch], max_cycles: int) -> None:
+        """Compare the passages with batches of earlier ones that did not settle."""
+        if batches:
+            self._amplitudes.continue_after(batches)
+            self._set_limit(max_cycles)
+
+    def _set_limit(self, max_cycles: int) -> None:
+        """Set the end of a batch that is not the first one."""
+        self._limit = self._count + max(SPREAD_PASSAGES, int(BATCH_PART * max_cycles))
 
     def _restart(self) -> None:
         """Forget earlier passages, as the section or the state has been replaced."""
@@ -174,7 +193,7 @@ class _Settling:
                     return words, None, ""
                 return words, Level.of(force), ""
             multiple, error = self._multiple()
-            if error < self._tolerance and len(self._rows) > 2 * multiple:
+            if error < self._tolerance and self._is_settled(multiple):
                 force = self._force_of(multiple)
                 if not level.fits(force):
                     return words, Level.of(force), ""
@@ -183,12 +202,30 @@ class _Settling:
         self._amplitudes.end_batch()
         if self._amplitudes.fall_between_batches():
             return words, None, "smooth"
-        if self._amplitudes.stay():
+        if self._amplitudes.are_all or (self._amplitudes.stay() and not self._may_settle()):
             return words, level, "periodic" if self._spread()[1] < MAX_SPREAD else "irregular"
-        self._limit = self._count + max(SPREAD_PASSAGES, int(BATCH_PART * max_cycles))
+        self._set_limit(max_cycles)
         pause = self._amplitudes.pause(self._motion.loading_time)
         words, trace = self._motion.advance(words, pause)
         return words, self.level_of(trace), ""
+
+    def _is_settled(self, multiple: int) -> bool:
+        """Whether the changes of the last two cycles of some passages are small."""
+        if len(self._rows) <= 2 * multiple:
+            return False
+        changes = self._differences(multiple)[-2 * multiple :]
+        return float(np.max(np.abs(changes))) < MAX_CHANGE * self._tolerance
+
+    def _may_settle(self) -> bool:
+        """Whether passages are few, or changes over a cycle of some still become smaller."""
+        if len(self._rows) < SPREAD_PASSAGES:
+            return True
+        for multiple in range(1, MAX_MULTIPLE + 1):
+            sizes = np.max(np.abs(self._differences(multiple)), axis=1)
+            early, _, late = (float(np.median(one)) for one in np.array_split(sizes, 3))
+            if late < SETTLING * early:
+                return True
+        return False
 
     def _spread(self) -> tuple[int, float]:
         """Number of passages in a cycle with the smallest relative spread, and that spread."""
@@ -316,6 +353,7 @@ class _Settling:
             error if motion == "periodic" else math.nan,
             changes[-4 * MAX_MULTIPLE :],
             np.array(self._rows).reshape(-1, 3),
+            self._amplitudes.batches,
         )
 
 

@@ -15,6 +15,9 @@ Array = NDArray[np.float64]
 
 # Fraction of the depth of a fall at either end that is excluded from its duration.
 MARGIN = 0.1
+# A fall within so many samples to so many standard deviations of the noise above its minimum ends
+# there, not at the minimum.
+SUDDEN, NEAR = 2, 3.0
 
 
 def fall_period(time: Array, force: Array, tops: Samples, bottoms: Samples) -> float:
@@ -65,8 +68,8 @@ def fall_rates(level: Level, period: float, tops: Samples, bottoms: Samples) -> 
 
 def ends_of(
     time: Array, force: Array, tops: Samples, bottoms: Samples, noise: float, half: Samples
-) -> tuple[Samples, Array, Array]:
-    """Samples at which slips start, and the forces at both ends, averaged over the noise.
+) -> tuple[Samples, Samples, Array, Array]:
+    """Samples at which slips start and end, and the forces there, averaged over the noise.
 
     ``half`` is half a period in samples, for each slip.
     """
@@ -95,6 +98,14 @@ def ends_of(
         means = np.convolve(force[top : bottom + width], np.full(width, 1 / width), "valid")
         high = np.flatnonzero(means >= lowest)
         starts[number] = min(top + (int(high[-1]) if high.size else 0), bottom - 1)
+    # After a fall that is faster than the sampling, noise determines which sample is the minimum.
+    bottoms = bottoms.copy()
+    for number in np.flatnonzero(bottoms - starts > SUDDEN).tolist():
+        low = force[bottoms[number]]
+        part = force[starts[number] + 1 :][:SUDDEN]
+        reached = part <= min(low + NEAR * noise, (level[number] + low) / 2)
+        if reached.any():
+            bottoms[number] = starts[number] + 1 + int(np.argmax(reached))
     near = np.maximum(1, half // 8)
     first = np.maximum(starts, bottoms - near)
     size = np.minimum(bottoms + near + 1, force.size) - first
@@ -103,4 +114,4 @@ def ends_of(
     if curved.size:
         around = Windows(first[curved], size[curved])
         after[curved] = parabolas_through(time, force, around, bottoms[curved])
-    return starts, level, after
+    return starts, bottoms, level, after

@@ -95,7 +95,7 @@ def find_slips(
     rates = fall_rates(level, period, tops, bottoms)
     tops, last = level.on_samples(cleaned, tops, bottoms)
     half = level.half_samples(tops, period)
-    first, before, after = ends_of(time, cleaned, tops, last, sigma, half)
+    first, last, before, after = ends_of(time, cleaned, tops, last, sigma, half)
     return FoundSlips(
         time[first],
         time[last],

@@ -132,7 +132,7 @@ def _without_repeated(
     crosses = times <= latest[np.maximum(starts - 1, 0)][block]
     share = np.bincount(block, is_other) / np.maximum(np.bincount(block, crosses), 1)
     is_again = (earlier != np.arange(len(rows))) & ~(is_other & (share < MIN_REPEATED)[block])
-    kept = ~is_again
+    kept: NDArray[np.bool] = ~is_again
     if kept.all():
         return rows
     again = lines[rows[~kept]]

@@ -140,7 +140,8 @@ def _with_detection(magnitude: Array) -> BValue:
     return BValue(
         to_b * rate,
         (ends[1] - ends[0]) / (2 * NORMAL_95),
-        *ends,
+        ends[0],
+        ends[1],
         completeness,
         magnitude.size,
         _p_value(kept - completeness) if kept.size else 1.0,

@@ -32,6 +32,7 @@ contains
 
       real(wp) :: rate, length, decay, gap, mean, square, before, diagonal_before
       real(wp) :: diagonal, beside, factor, off, pivot, ratio, rest, product
+      real(wp) :: end_before, residual_before
       integer :: i
 
       density = 0.0_wp
@@ -42,6 +43,8 @@ contains
       diagonal_before = 0.0_wp
       pivot = 1.0_wp
       rest = 0.0_wp
+      end_before = 0.0_wp
+      residual_before = 0.0_wp
       do i = 1, size(start)
          length = max((end(i) - start(i)) * rate, min_length)
          call means(length, mean, square)
@@ -50,15 +53,14 @@ contains
          off = 0.0_wp
          ratio = diagonal
          if (i > 1) then
-            gap = exp(-max(start(i) - end(i - 1), 0.0_wp) * rate)
+            gap = exp(-max(start(i) - end_before, 0.0_wp) * rate)
             beside = share * mean * before * gap
             factor = mean / before * gap * decay
             off = beside - factor * diagonal_before
             ratio = diagonal + factor * (factor * diagonal_before - 2.0_wp * beside)
-            rest = -off / pivot * rest
+            rest = -factor * residual_before - off / pivot * rest
          end if
          rest = rest + residual(i)
-         if (i > 1) rest = rest - factor * residual(i - 1)
          pivot = ratio - off**2 / pivot
          if (.not. pivot > 0.0_wp) then
             density = -huge(1.0_wp)
@@ -73,6 +75,8 @@ contains
          before = mean
          decay = 1.0_wp - length * mean
          diagonal_before = diagonal
+         end_before = end(i)
+         residual_before = residual(i)
       end do
       density = -0.5_wp * (density + log(product)) - size(start) * log(deviation)
    end function log_density

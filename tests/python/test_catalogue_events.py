@@ -45,8 +45,22 @@ def test_large_b_values_with_a_gradual_detection(count, max_error):
     assert np.median([one.error for one in found]) < max_error
 
 
-def test_a_fit_that_cannot_tell_the_law_from_the_detection_is_none():
-    assert b_value(10 ** np.random.default_rng(1).normal(0, 0.3, 40)) is None
+def test_a_fit_that_cannot_tell_the_law_from_the_detection_is_a_lower_limit():
+    """A normal distribution of magnitudes is one with any large b, not with a small one."""
+    found = b_value(10 ** np.random.default_rng(1).normal(0, 0.3, 40))
+    assert found.high == found.error == np.inf
+    assert 0.5 < found.low < found.value
+
+
+@pytest.mark.parametrize(("count", "blur"), [(60, 0.4), (150, 0.0)])
+def test_intervals_contain_the_truth(count, blur):
+    """Also where many catalogues give lower limits: to leave these out would keep the low ones."""
+    rng = np.random.default_rng(8)
+    found = [b_value(sizes(rng, 1.0, count, blur=blur)) for _ in range(20)]
+    inside = sum(one.low <= 1.0 <= one.high for one in found)
+    assert inside >= 17
+    limits = sum(np.isinf(one.high) for one in found)
+    assert (limits > 0) == (blur > 0)
 
 
 def test_omori_decay_and_its_absence():

@@ -347,3 +347,20 @@ def test_small_slips_are_stick_slip_and_smooth_sliding_has_none(tmp_path):
         counts = tree["slip_counts"]
         assert counts["mirrored_count"].sizes == counts["slip_count"].sizes
     assert found == {"slips": (STICK_SLIP, 16), "smooth": (SMOOTH, 0)}
+
+
+@pytest.mark.parametrize("noise", [0.001, 0.05, 0.08])
+def test_sudden_falls_end_where_they_have_fallen(noise):
+    """Not at the minimum of the noise after them, nor before the end of a slow fall."""
+    at = np.arange(6000)
+    rng = np.random.default_rng(3)
+    trace = np.where(at % 100 == 0, 0.0, (at % 100) / 100) + noise * rng.standard_normal(at.size)
+    found = find_slips(1e-3 * at, trace)
+    assert found.first.size >= 55
+    assert np.mean(found.last - found.first <= 2) > 0.95
+    assert np.abs((found.first + found.last) / 2 % 100 - 50).min() > 45
+    # A fall of half a sine in 20 samples.
+    phase = at % 120
+    slow = np.where(phase < 100, phase / 100, 0.5 + 0.5 * np.cos(np.pi * (phase - 100) / 20))
+    found = find_slips(1e-3 * at, slow + noise / 5 * rng.standard_normal(at.size))
+    assert np.median(found.last - found.first) == pytest.approx(20, abs=4)

@@ -354,6 +354,28 @@ def test_a_model_with_a_fit_beside_it_is_accepted(tmp_path):
     assert mesoslip.Config.from_toml(tree.attrs["configuration"]).spring_stiffness == 97.0
 
 
+def test_units_have_a_row_with_a_form_of_time_stamps(tmp_path):
+    """A preamble, names above units, decimal commas, European dates, a temperature."""
+    rows = [f"03.04.2026 14:05:0{n},5;{n},25;{3 * n},0;23,4\n" for n in range(9)]
+    names = "Bench 3;12\n\nDate time;Force;Load point;Temp\n"
+    text = names + "dd.mm.yyyy hh:mm:ss;mN;µm;°C\n" + "".join(rows)
+    record = record_of(tmp_path / "a.csv", text)
+    np.testing.assert_allclose(record.time, np.arange(9))
+    np.testing.assert_allclose(record.force, 1e-3 * (np.arange(9) + 0.25))
+    np.testing.assert_allclose(record.load_point, 3e-6 * np.arange(9))
+
+
+def test_time_stamps_of_twelve_hours_pass_noon_and_midnight(tmp_path):
+    stamps = ("11:59:58.5 AM", "11:59:59.5 AM", "12:00:00.5 PM", "12:00:01.5PM", "1:00:00.5 pm")
+    rows = [f"{one}|{n}.5\n" for n, one in enumerate(stamps)]
+    record = record_of(tmp_path / "a.txt", "Time|Force [N]\n" + "".join(rows))
+    np.testing.assert_allclose(record.time, [0, 1, 2, 3, 3602])
+    stamps = ("11:59:58 PM", "11:59:59 PM", "12:00:00 AM", "12:00:01 AM")
+    rows = [f"{one}|{n}.5\n" for n, one in enumerate(stamps)]
+    record = record_of(tmp_path / "a.txt", "Time|Force [N]\n" + "".join(rows))
+    np.testing.assert_allclose(record.time, np.arange(4))
+
+
 def ordered(time, force=None, **options):
     time = np.asarray(time, dtype=float)
     force = np.arange(len(time)) * 1.0 if force is None else np.asarray(force, dtype=float)
@@ -368,6 +390,17 @@ def test_blocks_written_twice_are_used_once():
     np.testing.assert_array_equal(found, np.arange(6))
     np.testing.assert_array_equal(force, np.arange(6))
     assert "2 lines written twice, used once: line 6, 7" in notes
+
+
+def test_rows_of_a_clock_that_starts_again_are_no_repeats():
+    """Coarse values are equal to earlier ones by chance."""
+    time = np.r_[0:100, 0:120]
+    force = np.random.default_rng(1).integers(0, 3, time.size)
+    found, values, notes = ordered(time, force)
+    np.testing.assert_array_equal(found, np.arange(120))
+    np.testing.assert_array_equal(values, force[100:])
+    assert "written twice" not in notes
+    assert "2 parts" in notes
 
 
 def test_a_late_block_goes_where_it_belongs():

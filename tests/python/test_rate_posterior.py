@@ -119,6 +119,19 @@ def test_the_density_of_a_nearly_linear_law_is_that_of_least_squares(fit):
     np.testing.assert_allclose(sides, -0.5, atol=0.1)
 
 
+def test_errors_of_motions_do_not_change_the_density(fit):
+    """By the tolerance, which follows from the noise."""
+    density = Density(fit)
+    points = density.starts(np.random.default_rng(1))
+    found = density(points)
+    exact = Density(fit)
+    exact.tolerance = 1e-9
+    error = found - exact(points)
+    assert 1e-6 < density.tolerance < 1e-4
+    assert np.ptp(error - np.median(error)) < 0.3
+    assert np.ptp(found) > 5
+
+
 def test_draws_have_the_mean_and_the_width_of_least_squares(sampled):
     """Wider by the noise, whose correlation is not known."""
     fit, values = sampled.fit, sampled.values.reshape(-1, len(sampled.prior))

@@ -460,3 +460,40 @@ def test_the_period_of_revolutions_is_found() -> None:
     assert found.notes[0].startswith("guess: a revolution takes 923")
     with pytest.raises(mesoslip.FileError, match="does not repeat"):
         mesoslip.strokes(record_tree(time, rng.standard_normal(time.size)), period="auto")
+
+
+def strokes_of_made(number: int, tmp_path):
+    """The strokes of a record of the study, and its truth."""
+    record = made(number)
+    record.write(tmp_path / "a.csv")
+    return strokes_of(mesoslip.read_trace(tmp_path / "a.csv")), record
+
+
+@pytest.mark.parametrize("number", [25, 178])
+def test_a_few_slips_at_the_end_of_a_stroke_are_sliding(number, tmp_path):
+    """The reversal takes more than half of a stroke, and few slips are left after it."""
+    found, record = strokes_of_made(number, tmp_path)
+    friction = found.overall["mean_friction"]
+    assert abs(friction.mean - record.friction) < max(3 * friction.error, 0.05 * record.friction)
+    assert friction.error < 0.05 * record.friction
+    assert found.columns["strokes"]["slides"].all()
+
+
+def test_rest_at_the_end_of_partial_slip_is_no_sliding(tmp_path):
+    """A bend of the force, where the drive comes to rest, is no slip."""
+    found, _ = strokes_of_made(47, tmp_path)
+    assert not found.columns["strokes"]["slides"].any()
+    assert "mean_friction" not in found.overall
+
+
+@pytest.mark.parametrize("late", [0.0, 0.25, 0.5])
+def test_offsets_of_partial_slip_have_the_error_of_the_reversals(late: float) -> None:
+    """Of an odd number of samples a cycle, so that both reversals differ, in all cycles alike."""
+    phase = (np.arange(41 * 12) + late) / 41
+    x = drive("triangle", phase)
+    found = strokes_of(record_tree(10 * phase, elastic_sliding(x, 0.9) + 0.3, drive_displacement=x))
+    offset, friction = (found.overall[one] for one in ("offset", "mean_friction"))
+    # The spring is relaxed where the record starts. A quarter of a step of 0.1 is the maximum.
+    assert abs(offset.mean - (0.3 - 0.9 * x[0])) < 2.5 * offset.error
+    assert 0.005 < offset.error < 0.02
+    assert friction.error < 0.2 * offset.error

@@ -53,21 +53,23 @@ def sequence(
 
 
 def main(count: int) -> None:
-    """Print shares of results within 1.96 standard errors."""
+    """Print shares of intervals that contain the truth, and of results within 1.96 errors."""
     rng = np.random.default_rng(1)
     kinds = {"sharp": 0.0, "gradual": 0.2, "wide": 0.4}
     for b in (0.7, 1.0, 1.5):
-        for kind, number in itertools.product((*kinds, "ramp"), (50, 200, 1000)):
-            ratios = []
+        for kind, number in itertools.product((*kinds, "ramp"), (50, 100, 200, 1000)):
+            found = []
             for _ in range(count):
                 made = sizes(rng, b, number, kinds[kind]) if kind in kinds else ramp(rng, b, number)
-                found = b_value(made)
-                if found is not None:
-                    ratios.append((found.value - b) / found.error)
-            inside = np.mean(np.abs(ratios) < 1.96)
+                one = b_value(made)
+                if one is not None:
+                    found.append(one)
+            inside = np.mean([one.low <= b <= one.high for one in found])
+            limits = np.mean([math.isinf(one.high) for one in found])
+            ratios = [(one.value - b) / one.error for one in found if math.isfinite(one.error)]
             print(
-                f"b {b}, {kind}, {number} events: {inside:.2f} of {len(ratios)} inside, "
-                f"bias {np.mean(ratios):+.2f} errors",
+                f"b {b}, {kind}, {number} events: {inside:.2f} of {len(found)} inside, "
+                f"{limits:.2f} lower limits, bias of the others {np.mean(ratios):+.2f} errors",
                 flush=True,
             )
     for p in (0.9, 1.2):

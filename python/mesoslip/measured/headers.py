@@ -30,9 +30,9 @@ EITHER = "either"
 
 # Names of the field, in lower case, without punctuation.
 NAMES = {
-    "time": "time|t|elapsed time|time elapsed|test time|run time|relative time|time stamp"
-    "|timestamp|zeit|temps|tiempo|tempo|time axis|x value|step time|pr fzeit|pruefzeit"
-    "|time 1 default sample rate",
+    "time": "time|t|elapsed|elapsed time|time elapsed|test time|run time|relative time"
+    "|time stamp|timestamp|datetime|date time|zeit|temps|tiempo|tempo|time axis|x value|step time"
+    "|pr fzeit|pruefzeit|time 1 default sample rate",
     "force": "force|spring force|shear force|shear load|friction force|frictional force"
     "|lateral force|tangential force|horizontal force|pulling force|traction force|drive force"
     "|driving force|kraft|reibkraft|ft|f t|fx|f x|f|fs|force x|force t|force tangential"

@@ -33,6 +33,9 @@ MAX_CROSSED = 2
 # Minimum share and number of samples with the time of the one before, if times are rounded.
 MIN_ROUNDED = 0.1
 MIN_ROUNDED_COUNT = 10
+# Minimum share of rows of a block, among those up to the latest time before it, that repeat earlier
+# ones.
+MIN_REPEATED = 0.5
 SIDES: tuple[Literal["left"], Literal["right"]] = ("left", "right")
 # Maximum number of rates that a summary names one by one.
 MAX_RATES = 3
@@ -105,16 +108,29 @@ def _without_repeated(
     notes: list[str],
     row: str,
 ) -> Numbers:
-    """Leave out rows that repeat earlier ones in time and values."""
+    """Leave out rows that repeat earlier ones in time and values.
+
+    Of a block that goes back in time, most rows do: after a clock that starts again, some are equal
+    to earlier ones by chance.
+    """
     every = np.ascontiguousarray(np.vstack([time, *values])[:, rows].T) + 0.0
     # Missing numbers are equal to each other.
     every[np.isnan(every)] = np.inf
     view = every.view([("", every.dtype)] * every.shape[1]).ravel()
-    _, first = np.unique(view, return_index=True)
+    _, first, which = np.unique(view, return_index=True, return_inverse=True)
     if len(first) == len(rows):
         return rows
-    kept = np.zeros(len(rows), dtype=bool)
-    kept[first] = True
+    times, earlier = time[rows], first[which.ravel()]
+    block = np.cumsum(np.diff(times, prepend=times[0]) < 0)
+    is_other = block[earlier] != block
+    latest = np.maximum.accumulate(times)
+    starts = np.searchsorted(block, np.arange(block[-1] + 1))
+    crosses = times <= latest[np.maximum(starts - 1, 0)][block]
+    share = np.bincount(block, is_other) / np.maximum(np.bincount(block, crosses), 1)
+    is_again = (earlier != np.arange(len(rows))) & ~(is_other & (share < MIN_REPEATED)[block])
+    kept: NDArray[np.bool] = ~is_again
+    if kept.all():
+        return rows
     again = lines[rows[~kept]]
     notes.append(
         f"{len(again)} {row}{'s' if len(again) > 1 else ''} written twice, used once: {row} "

@@ -26,9 +26,10 @@ MAX_DETECTED = 10_000
 # Starts of the estimate, widths of the detection over the standard deviation of the magnitudes;
 # and the minimum.
 WIDTHS, MIN_WIDTH = (0.05, 0.5), 1e-3
-# Half of the likelihood ratio, and number of standard errors, at the ends of a 95 % interval.
-LIKELIHOOD_95, NORMAL_95 = 1.92, 1.96
-# Maximum logarithm of the end of that interval over the estimate.
+# Half of the likelihood ratio, number of standard errors, and probabilities below the ends of a
+# 95 % interval.
+LIKELIHOOD_95, NORMAL_95, TAILS = 1.92, 1.96, np.array([0.025, 0.975])
+# Maximum logarithm of the upper end of that interval over the estimate.
 MAX_REACH = 2.0
 # Maximum probability at which the law is rejected.
 REJECTED = 0.05
@@ -40,10 +41,15 @@ MIN_GAIN = 2.0
 
 @dataclass(frozen=True)
 class BValue:
-    """The b-value of a catalogue, with its standard error."""
+    """The b-value of a catalogue, with its standard error and a 95 % interval."""
 
     value: float
     error: float
+    """Infinite if the events only give a lower limit: a steep law with a wide detection is like a
+    normal distribution of any b."""
+    low: float
+    high: float
+    """Ends of the interval; the upper one is infinite for a lower limit."""
     completeness: float
     """Magnitude from which on the law is fitted, or tested if all events are."""
     count: int
@@ -63,7 +69,7 @@ def b_value(sizes: Array, completeness: float | None = None) -> BValue | None:
     of Woessner and Wiemer (Bull. Seismol. Soc. Am. 95, 684 (2005)); if the law is rejected there,
     it is the first magnitude above at which it is not. With 200 events above it, or a rejection
     below, or a completeness that is given, b is Aki's of these events; and that of the fit of all
-    events otherwise, with an error from the profile of the likelihood.
+    events otherwise, with an interval from the profile of the likelihood.
     """
     sizes = np.asarray(sizes, dtype=float)
     magnitude = np.log10(sizes[np.isfinite(sizes) & (sizes > 0)])
@@ -74,8 +80,7 @@ def b_value(sizes: Array, completeness: float | None = None) -> BValue | None:
     every = _with_detection(magnitude)
     found = _fit(magnitude, every.completeness)
     if found is None or (found.count < MIN_COMPLETE and found.p_value >= REJECTED):
-        # With an infinite error the events do not tell the law from the detection.
-        return every if math.isfinite(every.error) else None
+        return every
     while found.p_value < REJECTED:
         # The detection of events is no such distribution, or they follow no such law.
         higher = _fit(magnitude, found.completeness + BIN)
@@ -122,20 +127,20 @@ def _with_detection(magnitude: Array) -> BValue:
         lowest = fitted(lambda x: cost(beta, x[0], math.exp(x[1])), start, 1e-3).fun
         return float(lowest - best.fun) - LIKELIHOOD_95
 
-    ends = []
+    to_b, ends = math.log10(math.e) / spread, []
     for sign in (-1, 1):
         reach = sign / math.sqrt(count)
-        while excess(reach) < 0 and abs(reach) < MAX_REACH:
+        while reach < MAX_REACH and excess(reach) < 0:
             reach *= 2
-        is_found = abs(reach) < MAX_REACH
-        shift = brentq(excess, 0, reach, xtol=0.01) if is_found else sign * math.inf
-        ends.append(rate * math.exp(shift))
-    to_b = math.log10(math.e) / spread
+        shift = brentq(excess, 0, reach, xtol=0.01) if reach < MAX_REACH else math.inf
+        ends.append(to_b * rate * math.exp(shift))
     completeness = max(middle + spread * (mu + MARGIN * width), float(magnitude.min()))
     kept = magnitude[magnitude >= completeness]
     return BValue(
         to_b * rate,
-        to_b * (ends[1] - ends[0]) / (2 * NORMAL_95),
+        (ends[1] - ends[0]) / (2 * NORMAL_95),
+        ends[0],
+        ends[1],
         completeness,
         magnitude.size,
         _p_value(kept - completeness) if kept.size else 1.0,
@@ -144,7 +149,12 @@ def _with_detection(magnitude: Array) -> BValue:
 
 
 def _fit(magnitude: Array, completeness: float) -> BValue | None:
-    """Aki's estimate from magnitudes above a completeness; None for too few."""
+    """Aki's estimate from magnitudes above a completeness; None for too few.
+
+    The sum of n of them above the completeness has a gamma distribution.
+    """
+    from scipy.special import gammaincinv
+
     kept = magnitude[magnitude >= completeness]
     if kept.size < MIN_EVENTS:
         return None
@@ -154,7 +164,9 @@ def _fit(magnitude: Array, completeness: float) -> BValue | None:
     # Without the bias by few events.
     value = math.log10(math.e) / excess * (kept.size - 1) / kept.size
     error = value / math.sqrt(kept.size - 2)
-    return BValue(value, error, completeness, kept.size, _p_value(kept - completeness))
+    low, high = math.log10(math.e) / excess * gammaincinv(kept.size, TAILS) / kept.size
+    p_value = _p_value(kept - completeness)
+    return BValue(value, error, float(low), float(high), completeness, kept.size, p_value)
 
 
 def _p_value(excess: Array) -> float:

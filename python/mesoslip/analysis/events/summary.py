@@ -77,7 +77,12 @@ class EventSummary:
         else:
             is_aki = math.isnan(self.b.half_detected)
             label = "b-value (Aki)" if is_aki else "b-value (with detection)"
-            yield label, with_error(self.b.value, self.b.error)
+            ends = [number(one, 3) for one in (self.b.low, self.b.high)]
+            if math.isfinite(self.b.high):
+                yield label, with_error(self.b.value, self.b.error)
+                yield "95 % interval", " to ".join(ends)
+            else:
+                yield label, f"above {ends[0]} (95 %), by these events alone"
             yield "events of the fit", str(self.b.count)
             if not is_aki:
                 yield "half are detected at log10(size)", number(self.b.half_detected)
@@ -249,8 +254,9 @@ def events(
     Returns
     -------
     dict
-        ``b_value`` and ``omori`` with standard errors, None for too few events; ``coincidence`` of
-        slips and events of the channel; ``events``, with times [s] and sizes.
+        ``b_value``, with a 95 % interval from ``low`` to ``high``, and ``omori``, both with
+        standard errors, None for too few events; ``coincidence`` of slips and events of the
+        channel; ``events``, with times [s] and sizes.
 
     Raises
     ------

@@ -18,6 +18,9 @@ from mesoslip.array_types import Array
 
 # Fraction of the depth of a fall at either end that is excluded from its duration.
 MARGIN = 0.1
+# A fall within so many samples to so many standard deviations of the noise above its minimum ends
+# there, not at the minimum.
+SUDDEN, NEAR = 2, 3.0
 
 
 def fall_period(time: Array, force: Array, tops: Samples, bottoms: Samples) -> float:
@@ -68,8 +71,8 @@ def fall_rates(level: Level, period: float, tops: Samples, bottoms: Samples) -> 
 
 def ends_of(
     time: Array, force: Array, tops: Samples, bottoms: Samples, noise: float, half: Samples
-) -> tuple[Samples, Array, Array]:
-    """Samples at which slips start, and the forces at both ends, averaged over the noise.
+) -> tuple[Samples, Samples, Array, Array]:
+    """Samples at which slips start and end, and the forces there, averaged over the noise.
 
     ``half`` is half a period in samples, for each slip.
     """
@@ -98,6 +101,14 @@ def ends_of(
         means = np.convolve(force[top : bottom + width], np.full(width, 1 / width), "valid")
         high = np.flatnonzero(means >= lowest)
         starts[number] = min(top + (int(high[-1]) if high.size else 0), bottom - 1)
+    # After a fall that is faster than the sampling, noise determines which sample is the minimum.
+    bottoms = bottoms.copy()
+    for number in np.flatnonzero(bottoms - starts > SUDDEN).tolist():
+        low = force[bottoms[number]]
+        part = force[starts[number] + 1 :][:SUDDEN]
+        reached = part <= min(low + NEAR * noise, (level[number] + low) / 2)
+        if reached.any():
+            bottoms[number] = starts[number] + 1 + int(np.argmax(reached))
     near = np.maximum(1, half // 8)
     first = np.maximum(starts, bottoms - near)
     size = np.minimum(bottoms + near + 1, force.size) - first
@@ -106,7 +117,7 @@ def ends_of(
     if curved.size:
         around = Windows(first[curved], size[curved])
         after[curved] = parabolas_through(time, force, around, bottoms[curved])
-    return starts, level, after
+    return starts, bottoms, level, after
 
 
 @dataclass(frozen=True)
@@ -185,7 +196,7 @@ def find_slips(
     rates = fall_rates(level, period, tops, bottoms)
     tops, last = level.on_samples(cleaned, tops, bottoms)
     half = level.half_samples(tops, period)
-    first, before, after = ends_of(time, cleaned, tops, last, sigma, half)
+    first, last, before, after = ends_of(time, cleaned, tops, last, sigma, half)
     return FoundSlips(
         time[first],
         time[last],

@@ -28,6 +28,9 @@ MIN_SAMPLES = 3
 # level of sliding is, the minimum share of the middle without reversal, and the maximum slope of
 # the force there, over that of the reversal, and growth over its swing.
 REVERSAL, LAST, MIN_SLIDING, MAX_SLOPE, MAX_GROWTH = 1.1, 1 / 4, 0.15, 0.1, 0.25
+# Minimum fall of a slip, over the noise and over the swing: it shows that a shorter part slides, in
+# which the force grows or falls by as much, depending on where slips start and end.
+MIN_FALL = (6.0, 0.05)
 # Samples over which the maximum is a mean: a share of the stroke, and the maximum number.
 PEAK_SHARE, MAX_PEAK = 0.01, 9
 # Shares of the swing at a reversal over which lines are fitted, the longest first; minimum number
@@ -109,19 +112,24 @@ def measure(
         return None
     bottom, level, end = _reversal(position, along, first, after)
     start = max(first, end)
-    if after - start < max(MIN_SAMPLES, MIN_SLIDING * (after - first)):
+    swing = level - bottom
+    fall = _fall(along[start:after])
+    if fall <= max(MIN_FALL[0] * record.noise, MIN_FALL[1] * swing) or swing <= 0:
+        fall = 0.0
+    least = 0.0 if fall > 0 else MIN_SLIDING * (after - first)
+    if after - start < max(MIN_SAMPLES, least):
         start, slides = (max(first, after - MIN_SAMPLES), True) if slides else (first, False)
     if slides is None:
         share = float(position[after - 1] - position[start]) / max(float(position[end]), 1e-300)
-        growth = _growth(position[start:after], along[start:after]) / (level - bottom)
-        slides = growth < min(MAX_GROWTH, MAX_SLOPE * REVERSAL * share)
+        growth = _growth(position[start:after], along[start:after]) - fall
+        slides = growth / swing < min(MAX_GROWTH, MAX_SLOPE * REVERSAL * share)
     if slides:
         start += _transient(along[start:after])
     inside = slice(start if slides else first, after)
     friction = (
         mean_of(record, along[inside])
         if slides
-        else _whole_mean(record, position, along, (edge, length - edge), inside)
+        else _whole_mean(record, piece.direction, position, along, (edge, length - edge), inside)
     )
     coefficient = Measured()
     if record.normal is not None:
@@ -179,6 +187,11 @@ def _growth(position: Array, along: Array) -> float:
     return slope * float(position[-1] - position[0])
 
 
+def _fall(along: Array) -> float:
+    """The deepest fall of the force from a maximum before it."""
+    return float((np.maximum.accumulate(along) - along).max()) if along.size else 0.0
+
+
 def _transient(values: Array) -> int:
     """Samples at the start that are not steady yet, as where a reversal ends slowly."""
     found = steady_mean(values[np.newaxis])
@@ -200,9 +213,19 @@ def mean_of(record: StrokeRecord, values: Array) -> Measured:
 
 
 def _whole_mean(
-    record: StrokeRecord, position: Array, along: Array, ends: tuple[float, float], inside: slice
+    record: StrokeRecord,
+    direction: int,
+    position: Array,
+    along: Array,
+    ends: tuple[float, float],
+    inside: slice,
 ) -> Measured:
-    """Mean of a force that grows, over the position between two ends; unknown without one."""
+    """Mean of a force that grows, over the position between two ends; unknown without one.
+
+    A reversal is up to half a step of the position from its nearest sample, on either side. By half
+    the difference of both distances the middle is shifted, in the strokes of both directions alike:
+    friction is right, and the offset of the force wrong.
+    """
     if record.position is None:
         return Measured()
     first, after = max(inside.start, 1), min(inside.stop, along.size - 1)
@@ -213,8 +236,15 @@ def _whole_mean(
     ]
     x = np.concatenate([[ends[0]], position[first:after], [ends[1]]])
     y = np.concatenate([edges[:1], along[first:after], edges[1:]])
-    mean = float(np.trapezoid(y, x)) / (ends[1] - ends[0])
-    return Measured(mean, record.noise * math.sqrt(record.variance_ratio / max(after - first, 1)))
+    width = ends[1] - ends[0]
+    slope = (edges[1] - edges[0]) / width
+    noise = record.noise * math.sqrt(record.variance_ratio / max(after - first, 1))
+    shift = math.hypot(position[2] - position[1], position[-2] - position[-3]) / (8 * math.sqrt(3))
+    return Measured(
+        float(np.trapezoid(y, x)) / width,
+        math.hypot(noise, slope * record.position_noise),
+        direction * slope * shift,
+    )
 
 
 def _stiffness(

@@ -21,12 +21,14 @@ MISSING = {
     *("-infinity", "null", "none", "over", "under", "overflow", "underflow", "overrange", "ol"),
     *("over range", "overload", "-over", "+over", "missing", "*", "**", "***", "?", "."),
 }
-# A time of the day, perhaps after a date of ISO 8601 or with points.
+# A time of the day, perhaps of 12 hours, perhaps after a date of ISO 8601 or with points.
 STAMP = re.compile(
     r"(?:(?P<date>[0-9]{4}-[0-9]{2}-[0-9]{2}|[0-9]{2}\.[0-9]{2}\.[0-9]{4})[T ]+)?"
     r"(?P<clock>[0-9]{1,2}:[0-9]{2}:[0-9]{2})(?:[.,](?P<part>[0-9]{1,9}))?"
-    r"(?:Z|[+-][0-9]{2}:?[0-9]{2})?"
+    r"(?: ?(?P<half>[AaPp])[Mm])?(?:Z|[+-][0-9]{2}:?[0-9]{2})?"
 )
+# The form of time stamps in place of a unit, such as "dd.mm.yyyy hh:mm:ss".
+STAMP_FORM = re.compile(r"(?i)(?=.*(?:yy|hh|jj))[dmyjhst.:/,f -]+")
 DAY = 86_400 * 10**9
 # Beginnings of lines that are comments.
 COMMENT = re.compile(r"\s*(?:#|%|//|!|\*)")
@@ -90,7 +92,10 @@ class Clock:
             clock = datetime.strptime(found["clock"], "%H:%M:%S")
         except ValueError:
             return None
-        second = 3600 * clock.hour + 60 * clock.minute + clock.second
+        hour = clock.hour
+        if found["half"]:
+            hour = hour % 12 + (12 if found["half"] in "Pp" else 0)
+        second = 3600 * hour + 60 * clock.minute + clock.second
         now = day * DAY + second * 10**9 + int(f"{found['part'] or 0:0<9}")
         if not date and self.first and now < self._last - DAY // 2:
             self._days += 1

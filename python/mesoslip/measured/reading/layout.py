@@ -17,6 +17,7 @@ from mesoslip.measured.headers import BRACKETS, read_header
 from mesoslip.measured.reading.cells import (
     COMMENT,
     DELIMITERS,
+    STAMP_FORM,
     is_missing,
     is_number,
     may_group,
@@ -34,6 +35,8 @@ MAX_HEADER_LINES = 200
 MIN_SCORE = 0.3
 # A name with a unit in brackets, as one cell among blanks.
 WORD = re.compile(r"[^\s\[({]+(?:\s*[\[({][^\])}]*[\])}])?|[\[({][^\])}]*[\])}]")
+# Units of quantities that are not used, in lower case.
+OTHER_UNITS = {"°c", "degc", "deg c", "c", "k", "°f", "%rh", "% rh", "a", "ma", "w", "db", "ohm"}
 MARKERS = "#%/!*;'\" \t"
 
 
@@ -223,10 +226,14 @@ def _header(
 
 
 def _are_units(cells: Sequence[str]) -> bool:
-    """Whether cells are units, or empty."""
+    """Whether cells are units, perhaps of quantities that are not used, or empty."""
     bare = [cell.strip("[](){}<> ") for cell in cells]
     return any(is_unit(cell) for cell in bare) and all(
-        is_unit(cell) or is_missing(cell) for cell in bare
+        is_unit(cell)
+        or is_missing(cell)
+        or cell.lower() in OTHER_UNITS
+        or STAMP_FORM.fullmatch(cell)
+        for cell in bare
     )
 
 

@@ -47,11 +47,12 @@ module mesoslip_interface_law
       real(wp) :: inverse_mass = 0.0_wp, own_rate = 0.0_wp
       !> Whether the slider keeps its velocity until the drive changes
       logical :: is_uniform = .false.
-      !> Whether all that changes its acceleration is known: the square of its own rate times
-      !> velocity [m/s3] and acceleration [m/s4] of the drive, its damping rate [1/s], and the
-      !> deceleration by its damper [m/s2]
+      !> Whether all that changes its acceleration is known, as follows
       logical :: is_known = .false.
-      real(wp) :: driving = 0.0_wp, driving_rate = 0.0_wp, damping = 0.0_wp, damper = 0.0_wp
+      !> Velocity [m/s3] and acceleration [m/s4] of the drive, times the square of the own rate
+      real(wp) :: driving = 0.0_wp, driving_rate = 0.0_wp
+      !> Damping rate [1/s], and deceleration by the damper [m/s2]
+      real(wp) :: damping = 0.0_wp, damper = 0.0_wp
    end type pose_type
 
    !> A clock of thermally activated breaking. The rate of a contact that bears the force f is

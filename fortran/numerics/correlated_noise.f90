@@ -1,8 +1,8 @@
 !> Density of residuals under white and exponentially correlated noise that is averaged over points.
 !>
 !> A point is the mean of its samples, which lie between two times. The correlation of two points
-!> decays by one factor from each to the next: less that of the point before times this factor,
-!> residuals are correlated with their neighbours only, and their matrix is tridiagonal.
+!> decays by one factor from each to the next. Subtracting the residual before, times this factor,
+!> leaves correlations of neighbours only: a tridiagonal matrix.
 module mesoslip_numerics_correlated_noise
    use mesoslip_numerics_kinds, only: wp
    implicit none
@@ -14,7 +14,7 @@ module mesoslip_numerics_correlated_noise
    real(wp), parameter :: short = 0.02_wp
    !> Minimum of this length
    real(wp), parameter :: min_length = 1.0e-9_wp
-   !> Number of pivots whose product does not overflow
+   !> Number of pivots whose product does not underflow
    integer, parameter :: block = 8
 
 contains

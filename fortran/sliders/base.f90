@@ -80,7 +80,7 @@ module mesoslip_sliders_base
       procedure(observe_interface), deferred :: observe
       procedure(energy_interface), deferred :: energy
       procedure, non_overridable :: pose
-      !> Add what changes the acceleration to a pose, for contacts that foresee the motion
+      !> Complete a pose with drive and damper, for contacts that predict the motion
       procedure :: complete_pose
       procedure :: adapt_to_drive
       procedure :: can_pause
@@ -150,7 +150,7 @@ contains
          & .and. .not. abs(self%acceleration) > 0.0_wp)
    end function pose
 
-   !> Add what changes the acceleration to a pose: it is unknown, for most sliders.
+   !> Complete a pose with drive and damper: of most sliders their rates are unknown.
    pure subroutine complete_pose(self, pose)
       class(slider_type), intent(in) :: self
       type(pose_type), intent(inout) :: pose

@@ -171,7 +171,7 @@ contains
       real(wp), intent(inout) :: step
       !> The clock that ends the step, or 0
       integer, intent(out) :: ended_by
-      !> Whether it is; if not, nothing has changed
+      !> Whether the series converges; if not, nothing has changed
       logical, intent(out) :: is_done
 
       real(wp) :: time, wanted, bent(0:bent_order, clocks), linear(clocks), reading(clocks)

@@ -177,7 +177,7 @@ def test_smooth_sliding_and_irregular_motion_are_told_apart():
     assert irregular.spread > 0.02
     assert sum(irregular.durations) < irregular.followed
     assert "stays irregular for" in irregular.verdict
-    assert f"confirmed in {irregular.cycles} at resolution 0.25" in irregular.verdict
+    assert f"confirmed in {irregular.cycles} at resolution 0.5" in irregular.verdict
     assert irregular.coarse_cycles > irregular.cycles
     assert irregular.is_stable is None
 

@@ -63,12 +63,13 @@ def sampled(record):
 
 @pytest.mark.parametrize("time", [1e-3, 0.5, 30.0])
 @pytest.mark.parametrize("share", [0.0, 0.4, 0.999])
-def test_the_density_of_residuals_is_that_of_their_covariance(share, time):
-    """Points of one to many samples, with gaps between them."""
+@pytest.mark.parametrize("width", [1.0, 1.5])
+def test_the_density_of_residuals_is_that_of_their_covariance(share, time, width):
+    """Points of one to many samples, with gaps between them, or wider than their distance."""
     rng = np.random.default_rng(1)
     count = rng.integers(1, 40, 50).astype(float)
     at = np.cumsum(0.2 * count + rng.exponential(0.3, 50)) - 0.1 * count
-    spread = 0.1 * np.sqrt((count**2 - 1) / 3)
+    spread = width * 0.1 * np.sqrt((count**2 - 1) / 3)
     model = NoiseModel.of(Points((), at, spread, at, count.astype(int), count, 0.1))
     residual = 0.02 * rng.standard_normal((2, 50))
     deviation = np.array([0.01, 0.03])

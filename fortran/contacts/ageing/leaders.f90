@@ -18,7 +18,8 @@ module mesoslip_contacts_ageing_leaders
 
    !> Contacts that are taken out of the queue together
    integer, parameter :: max_gathered = 16
-   !> Leaders that are extrapolated at once: a stop at the bound of another costs less than more
+   !> Leaders that are extrapolated at once: extrapolating more costs more than a stop at the bound
+   !> of the next
    integer, parameter :: max_extrapolated = 4
 
 contains

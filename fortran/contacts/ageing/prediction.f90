@@ -33,10 +33,10 @@ module mesoslip_contacts_ageing_prediction
       !> Acceleration [m/s2] and jerk under it, the error of the jerk in recent motions, and a bound
       !> on its error [m/s3]
       real(wp) :: acceleration = 0.0_wp, jerk = 0.0_wp, jerk_error = 0.0_wp, jerk_bound = 0.0_wp
-      !> Whether the motion is known: then its next derivative [m/s4], and a bound on that after it
-      !> [m/s5]
+      !> Whether the motion is known: then its next derivative [m/s4], and bounds on the two after it
+      !> [m/s5, m/s6]
       logical :: is_known = .false.
-      real(wp) :: snap = 0.0_wp, crackle_bound = 0.0_wp
+      real(wp) :: snap = 0.0_wp, crackle_bound = 0.0_wp, pop_bound = 0.0_wp
    contains
       procedure, non_overridable :: predict, compare, reach, extrapolate, shift, exchange
       procedure, non_overridable, private :: displacement_error
@@ -61,7 +61,7 @@ contains
       loss = pose%inverse_mass * law%drag + pose%damping
       self%jerk = (pose%driving - stiffness * pose%velocity + pose%damping * pose%damper) &
          & - loss * self%acceleration
-      ! A drive or a damper may change as fast as the slider itself.
+      ! Unless they are known, drive and damper may change as fast as the slider itself.
       self%jerk_bound = safety * self%jerk_error + min_jerk_error * abs(self%jerk) &
          & + pose%own_rate * (pose%own_rate * abs(pose%velocity) + abs(self%acceleration))
       self%is_known = pose%is_known
@@ -70,6 +70,8 @@ contains
          & - stiffness * self%acceleration - loss * self%jerk
       self%crackle_bound = safety * (pose%damping**2 * (abs(self%jerk) + abs(damper_rate)) &
          & + stiffness * abs(self%jerk) + loss * abs(self%snap))
+      ! Where the jerk passes 0, so does most of the bound above.
+      self%pop_bound = safety * stiffness * abs(self%snap)
    end subroutine predict
 
    !> Compare a motion with its prediction.
@@ -123,7 +125,7 @@ contains
       real(wp), intent(inout) :: growth
       logical, intent(out) :: is_known
 
-      real(wp) :: bend, pull, third, fourth, error, later_rate, step, excess, slope, change
+      real(wp) :: bend, pull, third, fourth, error, later_rate, step, excess, largest, slope, change
       integer :: number
 
       is_known = .false.
@@ -141,7 +143,9 @@ contains
 
       bend = 0.5_wp * ageing%curvature(rate, age)
       excess = (pull + (third + fourth * step) * step - bend) * step * slope
-      if (abs(excess) <= max_excess .and. abs(bend) * step**3 &
+      ! Terms that cancel in the sum do not in its derivative.
+      largest = (abs(pull) + (abs(third) + abs(fourth) * step) * step + abs(bend)) * step * slope
+      if (largest <= max_excess .and. abs(bend) * step**3 &
          & <= 0.1_wp * resolution * ageing%time) then
          step = step * (1.0_wp - excess * (1.0_wp - 2.0_wp * excess))
          growth = (rate + bend * step) * step
@@ -174,7 +178,7 @@ contains
       real(wp) :: error
 
       if (self%is_known) then
-         error = (1.0_wp / 120.0_wp) * self%crackle_bound * time**4
+         error = (self%crackle_bound / 120.0_wp + self%pop_bound / 720.0_wp * time) * time**4
       else
          error = (1.0_wp / 6.0_wp) * self%jerk_bound * time**2
       end if

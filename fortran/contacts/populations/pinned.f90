@@ -26,9 +26,9 @@ module mesoslip_contacts_populations_pinned
    real(wp), parameter :: track_part = 0.4_wp
    !> Stretch beyond which the cells of the initial states of wide laws grow with it
    real(wp), parameter :: min_even = 0.02_wp
-   !> Where only the displacement matters: that in which contacts join a population, over that of a
-   !> step, and broken part of it up to which they may
-   real(wp), parameter :: near_part = 0.125_wp, max_loss = 1.0e-3_wp
+   !> Maximum distance to a population that contacts join, over the length of a step, and maximum
+   !> broken part of it
+   real(wp), parameter :: join_part = 0.125_wp, max_loss = 1.0e-3_wp
    !> Number of forces at attaching if they have a width, evenly spaced, and their range in standard
    !> deviations
    integer, parameter :: max_classes = 25
@@ -44,7 +44,7 @@ module mesoslip_contacts_populations_pinned
       real(wp) :: newborn_force = 0.0_wp
       !> Mean stiffness of a contact that touches [N/m]
       real(wp) :: touching_stiffness = 0.0_wp
-      !> Whether contacts that attach may join any population that attached close by, as it does not
+      !> Whether contacts that attach may join a population that attached close by, as it does not
       !> matter when or at which strength
       logical, private :: may_join_any = .false.
       !> Number of forces at attaching; for each the relative force, the threshold up to which no
@@ -275,7 +275,8 @@ contains
       end associate
    end subroutine add_sliding
 
-   !> Attach contacts as one population for each force, at their mean displacement.
+   !> Attach contacts as one population for each force, at their mean displacement, or let them join
+   !> others.
    subroutine attach(self, births, moment, direction, displacement, birth, time, lost, error)
       class(pinned_populations_type), intent(inout) :: self
       !> Number of contacts, sum of their displacements [m], and direction of their forces
@@ -305,7 +306,7 @@ contains
          if (self%may_join_any) then
             call self%moments(1)%interpolate(self%class_broken(class), moments)
             if (moments(number) > 0.0_wp) row = self%row_to_join(origin, force, &
-               & near_part * self%step, (1.0_wp - max_loss) * moments(number))
+               & join_part * self%step, (1.0_wp - max_loss) * moments(number))
          end if
          if (row > 0) then
             call self%join(row, origin, self%share(class) * births * moments, displacement, time, &

@@ -1,6 +1,6 @@
 !> Numbers of pinned contacts of infinitely many, a row for each population.
 !>
-!> A population attached within one step. It is labelled by its origin, so that nothing is advected,
+!> A population attached within one step, or at one place. It is labelled by its origin, so that nothing is advected,
 !> and keeps the threshold below which its contacts have broken: the maximum of the force on it, in
 !> either direction.
 !>
@@ -185,9 +185,8 @@ contains
       end associate
    end subroutine add
 
-   !> The last population that contacts may join which attach with a force at an origin [m]: it
-   !> attached likewise within a distance [m], and no less than a part of its weight is left. 0 if
-   !> there is none.
+   !> Last population that contacts attaching with this force at this origin [m] may join: of the
+   !> same force, within a distance [m], with no less than a part of its weight left; 0 if none.
    pure function row_to_join(self, origin, force, distance, min_left) result(row)
       class(population_rows_type), intent(in) :: self
       real(wp), intent(in) :: origin, force, distance, min_left

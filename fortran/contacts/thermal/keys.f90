@@ -232,7 +232,8 @@ contains
    end subroutine update_deviate
 
    !> Raise the limit of a contact whose force is along the motion [m], and solve its key again. In
-   !> the order of the way back it stays where it was: there its force changes its sign.
+   !> the order of the way back it stays where it was: there its force changes its sign. The caller
+   !> updates the order ahead.
    subroutine raise_limit(self, contact, limit)
       class(thermal_keys_type), intent(inout) :: self
       integer, intent(in) :: contact

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mesoslip.array_types import Dataset
 from mesoslip.command_line.options import (
     ConfigArgument,
     JsonOption,
@@ -26,6 +25,7 @@ from mesoslip.command_line.options import (
 from mesoslip.command_line.progress import progress_shown
 
 if TYPE_CHECKING:
+    from mesoslip.array_types import Dataset
     from mesoslip.configuration.config import Config
     from mesoslip.cycles.cycle_result import Cycle
 

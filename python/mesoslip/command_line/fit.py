@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mesoslip.array_types import DataTree
 from mesoslip.command_line.options import (
     JsonOption,
     QuietOption,
@@ -21,6 +20,7 @@ from mesoslip.command_line.options import (
 )
 
 if TYPE_CHECKING:
+    from mesoslip.array_types import DataTree
     from mesoslip.inference.posterior import Row
 
 HEAD = (

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mesoslip.array_types import DataTree
 from mesoslip.command_line.options import (
     JsonOption,
     QuietOption,
@@ -21,6 +20,9 @@ from mesoslip.command_line.options import (
     write_table,
 )
 from mesoslip.errors import ConfigError, FileError, Problem
+
+if TYPE_CHECKING:
+    from mesoslip.array_types import DataTree
 
 
 def response(

@@ -5,14 +5,16 @@ from __future__ import annotations
 import math
 import time
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mesoslip.array_types import DataTree
 from mesoslip.command_line.options import SavedOption, counted, workers_option
 from mesoslip.command_line.progress import progress_shown, say, steps_shown
 from mesoslip.errors import ConfigError, Problem
+
+if TYPE_CHECKING:
+    from mesoslip.array_types import DataTree
 
 # Maximum number of files whose errors are printed.
 MAX_REPORTED = 5

@@ -152,9 +152,15 @@ class NoiseModel:
     def of(cls, points: Points) -> NoiseModel:
         """The noise of the points of a record."""
         half = math.sqrt(3) * points.spread
+        start, end = points.time - half, points.time + half
+        # Where the rate of samples changes within a point, it would overlap the next.
+        needed = np.maximum(half[:-1] + half[1:], np.diff(points.time))
+        share = np.diff(points.time) / needed
+        end[:-1] = points.time[:-1] + share * half[:-1]
+        start[1:] = points.time[1:] - share * half[1:]
         longest = MAX_TIME * float(points.time[-1] - points.time[0])
         shortest = max(points.interval, 1e-6 * longest)
-        return cls(points.time - half, points.time + half, points.count, (shortest, longest))
+        return cls(start, end, points.count, (shortest, longest))
 
     def covariance(self, deviation: float, share: float, time: float) -> Array:
         """Covariance of the points, shape (points, points).

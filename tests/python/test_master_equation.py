@@ -348,7 +348,6 @@ def test_detached_contacts_of_next_to_no_number_do_no_harm(klein):
     )
     realization = finish(config)
     assert abs(realization.energy_residual) < 1e-9
-    # Three times as much if whatever broke is a packet, however few.
     assert abs(realization.step_work) < 5e-4
 
 

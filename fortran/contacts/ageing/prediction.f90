@@ -33,8 +33,8 @@ module mesoslip_contacts_ageing_prediction
       !> Acceleration [m/s2] and jerk under it, the error of the jerk in recent motions, and a bound
       !> on its error [m/s3]
       real(wp) :: acceleration = 0.0_wp, jerk = 0.0_wp, jerk_error = 0.0_wp, jerk_bound = 0.0_wp
-      !> Whether the motion is known: then its next derivative [m/s4], and bounds on the two after it
-      !> [m/s5, m/s6]
+      !> Whether the motion is known: then its next derivative [m/s4], and bounds on the two after
+      !> it [m/s5, m/s6]
       logical :: is_known = .false.
       real(wp) :: snap = 0.0_wp, crackle_bound = 0.0_wp, pop_bound = 0.0_wp
    contains

@@ -1,8 +1,8 @@
 !> Numbers of pinned contacts of infinitely many, a row for each population.
 !>
-!> A population attached within one step, or at one place. It is labelled by its origin, so that nothing is advected,
-!> and keeps the threshold below which its contacts have broken: the maximum of the force on it, in
-!> either direction.
+!> A population attached within one step, or at one place. It is labelled by its origin, so that
+!> nothing is advected, and keeps the threshold below which its contacts have broken: the maximum
+!> of the force on it, in either direction.
 !>
 !> Where thresholds change with age, that is the configured threshold of the last contact that
 !> broke, as contacts of one age and force break in its order. It is solved again at the end of each

@@ -2,8 +2,10 @@
 program test_ageing_law
    use mesoslip_contacts_ageing_law, only: ageing_law_type, take_ageing_law
    use mesoslip_contacts_ageing_meeting, only: meet, meet_bound, meet_newborn
+   use mesoslip_contacts_ageing_prediction, only: prediction_type
    use mesoslip_contacts_threshold_laws, only: new_threshold_law
    use mesoslip_contacts_threshold_laws_base, only: threshold_law_type
+   use mesoslip_interface_law, only: interface_law_type, pose_type
    use mesoslip_numerics_errors, only: error_type
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_numerics_parameters, only: name_length, new_parameters, parameters_type
@@ -14,6 +16,8 @@ program test_ageing_law
    type(ageing_law_type) :: law
    class(threshold_law_type), allocatable :: thresholds
    type(error_type), allocatable :: error
+   ! Oscillation of a slider about its drive, and rate of a threshold
+   real(wp) :: amplitude, phase, rate
 
    call take("relax", [0.5_wp, 0.4_wp])
    call check(.not. allocated(error), "relax")
@@ -46,6 +50,7 @@ program test_ageing_law
    call consistent()
    call meeting()
    call check(law%acts() .and. .not. law%is_constant(1.2_wp, 1.0_wp), "thresholds change")
+   call never_late()
 
    call take("relax", [0.0_wp, 0.4_wp])
    call check(allocated(error), "young without force are refused")
@@ -58,6 +63,95 @@ program test_ageing_law
    call finish()
 
 contains
+
+   !> A slider that oscillates about a drive without damping meets a growing threshold no earlier
+   !> than predicted, and not much later.
+   subroutine never_late()
+      integer, parameter :: phases = 180
+      real(wp), parameter :: amplitudes(3) = [0.02_wp, 0.17_wp, 0.7_wp]
+      real(wp), parameter :: rates(4) = [0.1_wp, 0.7_wp, 0.95_wp, 0.999_wp]
+      real(wp), parameter :: times(3) = [0.1_wp, 0.25_wp, 0.5_wp]
+
+      type(prediction_type) :: prediction
+      type(pose_type) :: pose
+      type(interface_law_type) :: nothing
+      real(wp) :: gap, growth, found, late, early
+      logical :: is_known
+      integer :: i, j, k, l, count
+
+      count = 0
+      late = 0.0_wp
+      early = 0.0_wp
+      do i = 1, phases
+         phase = i * 4.0_wp * atan(1.0_wp) / 90.0_wp
+         do j = 1, size(amplitudes)
+            amplitude = amplitudes(j)
+            pose = pose_type(velocity=1.0_wp + amplitude * cos(phase), &
+               & acceleration=-amplitude * sin(phase), inverse_mass=1.0_wp, own_rate=1.0_wp, &
+               & is_known=.true., driving=1.0_wp)
+            prediction = prediction_type()
+            call prediction%predict(pose, nothing)
+            do k = 1, size(rates)
+               rate = rates(k) * pose%velocity
+               do l = 1, size(times)
+                  gap = distance(times(l), 0.0_wp)
+                  if (.not. gap > 0.0_wp) cycle
+                  found = 0.0_wp
+                  call prediction%extrapolate(law, rate, 0.5_wp, gap, pose%velocity, 1.0_wp, &
+                     & 1.0e-12_wp, found, is_known)
+                  if (.not. is_known) cycle
+                  growth = moved(meeting_time(gap)) - gap
+                  count = count + 1
+                  late = max(late, found - growth)
+                  if (k <= 2) early = max(early, 1.0_wp - found / growth)
+               end do
+            end do
+         end do
+      end do
+      call check(count > 3000, "motions that are predicted")
+      call check(late < 1.0e-13_wp, "breaks are not predicted late")
+      call check(early < 0.1_wp, "nor much too early where they are met fast")
+   end subroutine never_late
+
+   !> Displacement of the slider at a time.
+   real(wp) function moved(time)
+      real(wp), intent(in) :: time
+
+      moved = time + amplitude * (sin(time + phase) - sin(phase))
+   end function moved
+
+   !> Displacement less the growth of the threshold and a gap.
+   real(wp) function distance(time, gap)
+      real(wp), intent(in) :: time, gap
+
+      real(wp) :: grown, later_rate
+
+      call law%grow(rate, 0.5_wp, time, grown, later_rate)
+      distance = moved(time) - grown - gap
+   end function distance
+
+   !> First time at which the slider meets the threshold.
+   real(wp) function meeting_time(gap)
+      real(wp), intent(in) :: gap
+
+      real(wp) :: low, high
+      integer :: step
+
+      high = 0.0_wp
+      do step = 1, 400
+         high = step * 0.002_wp
+         if (distance(high, gap) >= -1.0e-14_wp) exit
+      end do
+      low = high - 0.002_wp
+      do step = 1, 60
+         meeting_time = 0.5_wp * (low + high)
+         if (distance(meeting_time, gap) >= 0.0_wp) then
+            high = meeting_time
+         else
+            low = meeting_time
+         end if
+      end do
+   end function meeting_time
 
    !> Take a law of ageing from named numbers.
    subroutine take(kind, values)

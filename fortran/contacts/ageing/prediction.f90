@@ -21,7 +21,7 @@ module mesoslip_contacts_ageing_prediction
    !> The same up to which that series starts Newton's method, and relative change of the time after
    !> which it ends: the error is the square of that
    real(wp), parameter :: max_start_excess = 0.2_wp, max_change = 1.0e-6_wp
-   !> Steps of Newton's method, which converges from one side: fewer only make windows shorter
+   !> Steps of Newton's method: without convergence nothing is extrapolated
    integer, parameter :: max_steps = 8
    !> Maximum duration for which a bound on the displacement is extrapolated [s], and its margin
    real(wp), parameter :: max_duration = 1.0e9_wp, margin = 1.5_wp
@@ -121,7 +121,7 @@ contains
       real(wp), intent(in) :: gap, speed, direction
       !> Distance below which the slider has met it [m]
       real(wp), intent(in) :: resolution
-      !> The growth [m]; not set if it cannot be extrapolated
+      !> The growth [m], if it can be extrapolated
       real(wp), intent(inout) :: growth
       logical, intent(out) :: is_known
 
@@ -162,6 +162,7 @@ contains
             growth = growth + later_rate * change
             if (abs(change) <= max_change * step) exit
          end do
+         if (number > max_steps) return
          growth = max(growth, 0.0_wp)
          ! A slider that slows down arrives later than one at the present speed.
          slope = 1.0_wp / min(speed - rate, slope)

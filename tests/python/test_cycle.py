@@ -182,6 +182,26 @@ def test_smooth_sliding_and_irregular_motion_are_told_apart():
     assert irregular.is_stable is None
 
 
+@pytest.mark.parametrize(("motion", "is_start"), [("smooth", True), ("periodic", False)])
+def test_what_long_steps_hand_over(motion, is_start, monkeypatch):
+    """No decayed motion, and no amplitudes but those of an irregular one; progress does not go
+    back."""
+    handed, parts = [], []
+
+    def settled(which, words, level, *, batches, **options):
+        if which.config.run.resolution == 1:
+            found = settle(which, words, level, batches=batches, **options)
+            return dataclasses.replace(found, motion=motion, batches=[Batch(0.0, 1.0, 0.1, False)])
+        handed.append((words is None, len(batches)))
+        return settle(which, words, level, batches=batches, **options)
+
+    monkeypatch.setattr(mesoslip.cycles.cycle, "settle", settled)
+    mesoslip.cycle(configuration(LONG_STEPS), find_multipliers=False, progress=parts.append)
+    assert handed == [(is_start, 0)]
+    assert parts == sorted(parts)
+    assert parts[-1] > 0.5
+
+
 def test_a_closed_cycle_is_not_irregular_though_long_steps_say_so(regular, monkeypatch):
     def settled(motion, *arguments, **options):
         found = settle(motion, *arguments, **options)

@@ -1,4 +1,4 @@
-"""Commands that print what is found in an output: slips, avalanches, events, strokes, plateaus."""
+"""Commands that print catalogues of an output: slips, avalanches, events, strokes, plateaus."""
 
 from __future__ import annotations
 

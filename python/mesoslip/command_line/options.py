@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 class Catalogue(Protocol):
-    """What is found in an output: tables for print, and notes on them."""
+    """A catalogue of an output: tables for print, and notes on them."""
 
     @property
     def tables(self) -> Sequence[PrintedTable]: ...
@@ -208,7 +208,7 @@ def show_catalogue(
     as_latex: bool,
     latex_table: int = 0,
 ) -> Found:
-    """Print what is found in an output, and write it to the file of a `TableOption`."""
+    """Print a catalogue of an output, and write it to the file of a `TableOption`."""
     from mesoslip.output import files, targets
     from mesoslip.output.table_files import latex
 

@@ -7,6 +7,7 @@ import dataclasses
 import math
 import os
 from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -138,8 +139,19 @@ def settled_cycle(
     is_stable = None if sliding is None else sliding.is_stable
     root = None if sliding is None else sliding.leading_root
 
+    begins_coarse = begins_coarse and config.run.resolution <= MAX_FINE
+
+    def report(part: float, *, is_coarse: bool) -> None:
+        if progress is not None:
+            progress(part / 2 + (0 if is_coarse else 0.5) if begins_coarse else part)
+
     def settled_at(
-        motion: Motion, words: Words | None, level: Level | None, batches: Sequence[Batch]
+        motion: Motion,
+        words: Words | None,
+        level: Level | None,
+        batches: Sequence[Batch],
+        *,
+        is_coarse: bool = False,
     ) -> Settled:
         return settle(
             motion,
@@ -150,14 +162,14 @@ def settled_cycle(
             root=root,
             tolerance=tolerance,
             max_cycles=max_cycles,
-            progress=progress,
+            progress=partial(report, is_coarse=is_coarse),
         )
 
     coarse, is_continued = None, words is not None
     batches: Sequence[Batch] = ()
-    if begins_coarse and config.run.resolution <= MAX_FINE:
+    if begins_coarse:
         with contextlib.suppress(RunError):
-            coarse = settled_at(Motion(_coarse(config)), None, None, ())
+            coarse = settled_at(Motion(_coarse(config)), None, None, (), is_coarse=True)
         # Steps that are too long may let an oscillation decay.
         if coarse is not None and coarse.motion == "smooth":
             coarse = None

@@ -18,7 +18,7 @@ from mesoslip.configuration.table import Table, Text, Whole, problem
 from mesoslip.configuration.units import is_number, number_of, text_to_si, to_si
 from mesoslip.errors import ConfigError, Problem, shown
 
-# Maximum size of a quantity in SI, so that what is derived from it does not overflow.
+# Maximum size of a quantity in SI, so that derived quantities do not overflow.
 MAX_SIZE = 1e30
 
 

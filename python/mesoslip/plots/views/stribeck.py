@@ -36,7 +36,7 @@ def _friction(found: Plateaus) -> tuple[str, str, str]:
 
 
 def draw_curve(axes: Axes, found: Plateaus) -> None:
-    """Draw the friction of each plateau over viscosity × speed/load, or what is known of it."""
+    """Draw the friction of each plateau over viscosity × speed/load, or the known part of that."""
     column, label, unit = _friction(found)
     name, title, abscissa_unit = next(
         one

@@ -18,10 +18,8 @@ from mesoslip.configuration.units import cf_units
 
 @dataclass(frozen=True)
 class KeyKind:
-    """The kind of value of a key, with an example; ``unit`` is None for whole numbers and names.
-
-    A key whose value is a list or a table is not single.
-    """
+    """The kind of value of a key, with an example; ``unit`` is None for whole numbers and names,
+    lists and tables are not single."""
 
     unit: str | None
     example: str

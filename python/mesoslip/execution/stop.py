@@ -31,10 +31,8 @@ class StopRequest(Protocol):
 
 
 class Stop:
-    """A request to stop soon, also set if the outer one is; ``signal`` is the signal that set it.
-
-    Unlike an event, it may be set by a signal handler.
-    """
+    """A request to stop soon, also set if the outer one is, and by a signal handler; ``signal`` is
+    the one that set it."""
 
     def __init__(self, outer: StopRequest | None = None) -> None:
         self._is_set = False

@@ -98,10 +98,8 @@ class Folder:
         )
 
     def lock(self) -> None:
-        """Make the folder and lock it for this process.
-
-        Raises a `FileError` if another process writes to it, an `OSError` if it cannot be made.
-        """
+        """Make and lock the folder: a `FileError` if another process writes to it, an `OSError` if
+        it cannot be made."""
         if self._lock is not None:
             return
         while True:

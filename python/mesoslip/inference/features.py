@@ -84,10 +84,8 @@ def _feature(name: str, group: str, kind: Kind, label: str, high: str, low: str)
 
 
 def features(scale: float, *, has_start: bool) -> Iterator[Feature]:
-    """The summaries of a trace in their order, with the unit of the forces [N].
-
-    ``has_start`` is whether the trace begins with the first loading of a run.
-    """
+    """The summaries of a trace in their order, with the unit of forces [N]; ``has_start`` if it
+    begins with the first loading of a run."""
     for one in (*_whole(), *(_start() if has_start else ()), *_slips(), *_loading()):
         scaled = one.kind in {"force", "log force", "log rate", "log power"}
         yield replace(one, factor=scale) if scaled else one

@@ -94,10 +94,8 @@ class Plan:
         overrides: Iterable[Change] = (),
         known: Known | None = None,
     ) -> Plan:
-        """Read a configuration file with a table [fit].
-
-        Known properties of the apparatus according to the traces replace missing keys.
-        """
+        """Read a configuration file with a table [fit], completed by the apparatus of the
+        traces."""
         path, overrides = Path(path), list(overrides)
         merged = read_toml(path)
         tables = override(_nested(merged), overrides).tables
@@ -241,10 +239,8 @@ class Known:
     duration: float
 
     def complete(self, tables: dict[str, Any], free: list[FreeParameter]) -> list[str]:
-        """Add missing keys of the apparatus to a configuration; returns the assumptions.
-
-        A mass that is neither given nor free becomes free, around that of the period of the slips.
-        """
+        """Add missing keys of the apparatus to a configuration, or a free mass around that of the
+        slips' period; returns the assumptions."""
         names = {one.key for one in free}
         drive = tables.setdefault("drive", {})
         slider = tables.setdefault("slider", {})

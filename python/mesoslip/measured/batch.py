@@ -81,10 +81,8 @@ def read_pieces(
     executor: ExecutorLike = None,
     progress: Callable[[float], None] = lambda _: None,
 ) -> list[Row]:
-    """Read files and write their outputs; the rows of those that were read before a stop.
-
-    A file that cannot be read has a row with the message.
-    """
+    """Read files and write their outputs; the rows of those before a stop, of a file that cannot be
+    read with the message."""
     pool = as_executor(executor, ThreadsThenProcesses)
     rows = []
     with closing(completed(pool, read_piece, pieces, stop, in_order=True)) as done:

@@ -72,10 +72,8 @@ def fit_label(axes: Axes, parts: Sequence[str]) -> str:
 
 
 def title_record(axes: Axes, tree: Tree, about: str = "") -> None:
-    """Write the title of an output, and a line about its stages, above the labels of the stages.
-
-    The legend goes between title and labels, where it hides no data.
-    """
+    """Write the title of an output, a legend, and a line about its stages, above the labels of the
+    stages."""
     titles(axes, tree, about)
     labels = axes.get_legend_handles_labels()[1]
     lines = sum(label.count("\n") + 1 for label in labels)

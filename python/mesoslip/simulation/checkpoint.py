@@ -203,10 +203,8 @@ class Checkpoint:
         return self._write(realizations)
 
     def restore(self, realizations: Sequence[Realization]) -> float:
-        """Restore realizations from the checkpoint, if there is one; returns its wall time [s].
-
-        Raises a `FileError` if it is of another configuration or program, or in use.
-        """
+        """Restore realizations, if there is a checkpoint; returns its wall time [s]. A `FileError`
+        if it is in use or of another run."""
         with suppress(OSError):
             self._files.lock()
         there = [name for name in (STATE, PREVIOUS) if (self.folder / name).exists()]

@@ -76,10 +76,8 @@ class RowFile:
         self._number: int | None = None
 
     def read(self, place: int, count: int) -> Array:
-        """Numbers from a place [bytes] on, fewer at the end of the file.
-
-        Raises a `RunError` if they cannot be read.
-        """
+        """Numbers from a place [bytes] on, fewer at the end of the file; a `RunError` if they
+        cannot be read."""
         try:
             if self._number is None:
                 self._number = regular_descriptor(self._path, os.O_RDONLY)
@@ -129,10 +127,8 @@ class Stored:
 
 
 class Rows:
-    """The rows of a table of one realization, in pieces; ``columns`` is the length of a row.
-
-    The thread of the realization adds pieces; another one writes them to files.
-    """
+    """The rows of a table of one realization with a number of columns, added by its thread and
+    written by another."""
 
     __slots__ = ("_count", "_lock", "_written", "columns", "pieces", "waiting_bytes")
 

@@ -38,10 +38,8 @@ class RenewalSolution:
 def solve_renewal(
     parameters: Parameters, start: float, width: float, panels: int
 ) -> RenewalSolution:
-    """Solve the renewal equation of a law, given by `mesoslip.theory.lives.law_parameters`.
-
-    ``start`` of the first panel and ``width`` of each are relative to the mean breaking stretch.
-    """
+    """Solve the renewal equation of a law by `law_parameters`, with start and width of panels over
+    the mean breaking stretch."""
     point, breaks, slope, force, stiffness, pinned, mismatch = checked(
         interruptible(_core.force_curve, *named(parameters), start, width, panels, POINTS)
     )

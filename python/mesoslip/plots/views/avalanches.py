@@ -106,10 +106,8 @@ def scaling_sizes(tree: DataTree) -> Array:
 def draw_distribution(
     axes: Axes, sizes: Array, fit: PowerLawFit | None = None, law: str = "", **style: Any
 ) -> None:
-    """Draw the density of avalanche sizes in logarithmic bins with intervals of 68 %.
-
-    The power law fitted to them is a line over its range, in the same colour if it has no label.
-    """
+    """Draw the density of avalanche sizes in logarithmic bins with intervals of 68 %, and the
+    fitted power law."""
     bins = logarithmic_bins(sizes)
     style = POINTS | {"markersize": 2.5, "elinewidth": 0.7} | style
     ends = counting_interval(bins.count) * bins.density / bins.count

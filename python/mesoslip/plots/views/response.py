@@ -127,10 +127,8 @@ def _scale(data: Arrays, name: str) -> float:
 
 
 def draw(tree: Tree, options: Options, figure: Canvas | None) -> Canvas:
-    """The record with the law that fits best; steady forces; healing in holds.
-
-    Measured traces, and sliders under a force, have pictures of their own.
-    """
+    """The record with the law that fits best, steady forces, healing; or a measured trace, or a
+    slider under a force."""
     experiment = Experiment(tree)
     if experiment.is_measured:
         return draw_measured(tree, experiment, figure)

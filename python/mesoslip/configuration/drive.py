@@ -166,7 +166,6 @@ class Stage(Table):
 
     @property
     def is_force(self) -> bool:
-        """Whether a force is prescribed."""
         return self.force is not None or self._is_ramp("force")
 
     @property

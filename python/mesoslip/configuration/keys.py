@@ -78,7 +78,6 @@ def key_kind(key: str) -> KeyKind | None:
 
 
 def _parts(annotation: Any) -> Iterator[Any]:
-    """All parts of an annotation."""
     yield annotation
     for part in get_args(annotation):
         yield from _parts(part)

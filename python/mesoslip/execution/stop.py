@@ -40,11 +40,9 @@ class Stop:
         self.signal: signal.Signals | None = None
 
     def set(self) -> None:
-        """Request a stop."""
         self._is_set = True
 
     def is_set(self) -> bool:
-        """Whether a stop is requested."""
         return self._is_set or (self._outer is not None and self._outer.is_set())
 
     def wait(self, seconds: float) -> bool:

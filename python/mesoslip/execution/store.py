@@ -208,7 +208,6 @@ class Pieces:
         self.path = path
 
     def names(self) -> set[str]:
-        """Names of the pieces."""
         try:
             return {one.stem for one in self.path.iterdir() if NAME.fullmatch(one.name) is not None}
         except FileNotFoundError:

@@ -68,7 +68,6 @@ class Control:
 
     @property
     def meaning(self) -> str:
-        """The meaning of the key."""
         return self.own_meaning or meaning(self.key)
 
     @property
@@ -118,7 +117,6 @@ class Scale:
     is_whole: bool
 
     def value(self, position: float) -> float:
-        """The value at a position."""
         part = min(max(position / STEPS, 0.0), 1.0)
         if part == 1:
             value = self.high

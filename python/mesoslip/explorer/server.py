@@ -52,7 +52,6 @@ POLICY = (
 
 
 def _part(name: str) -> str:
-    """A part of the page."""
     return files("mesoslip.explorer").joinpath(name).read_text("utf-8")
 
 

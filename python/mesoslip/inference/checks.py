@@ -55,7 +55,6 @@ class Agreement:
 
     @property
     def is_rejected(self) -> bool:
-        """Whether the model is rejected."""
         return self.probability < REJECTED
 
     @property

@@ -38,8 +38,6 @@ UNITS: dict[Kind, str] = {
 
 @dataclass(frozen=True)
 class Feature:
-    """A summary."""
-
     name: str
     """Name, unique in a fit."""
     group: str

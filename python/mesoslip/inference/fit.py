@@ -50,8 +50,6 @@ class Prediction:
 
 @dataclass(frozen=True)
 class FitResult:
-    """The result of a fit."""
-
     plan: Plan
     simulator: Simulator
     observed: Array

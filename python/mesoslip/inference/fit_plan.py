@@ -54,8 +54,6 @@ MASS_FACTOR = 4.0
 
 @dataclass(frozen=True)
 class Plan:
-    """The plan of a fit."""
-
     config: Config
     """The known parameters; its values of the free keys are not used."""
     prior: Prior
@@ -367,7 +365,6 @@ class _Reader:
         return value
 
     def free(self, table: object) -> Iterable[FreeParameter]:
-        """The free parameters."""
         if not isinstance(table, Mapping) or not table:
             self.wrong(
                 "fit.free",

@@ -96,11 +96,9 @@ class Summarizer:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the summaries."""
         return tuple(one.name for one in self.features)
 
     def slips(self, force: Array) -> FoundSlips:
-        """The slips of a trace."""
         return find_slips_between_reversals(
             self.pieces,
             self.time,

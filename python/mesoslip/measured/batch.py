@@ -70,7 +70,6 @@ def pieces_of(
 
 
 def output_name(file: Path) -> str:
-    """Name of the output of a file."""
     return f"{Path(file.stem).stem if file.suffix in PACKED else file.stem}.nc"
 
 

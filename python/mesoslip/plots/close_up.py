@@ -98,7 +98,6 @@ class Sampling(NamedTuple):
 
     @classmethod
     def of(cls, tree: Tree, slip: Slip, realization: int) -> Sampling:
-        """The sampling of a slip."""
         start, end = slip["start_time"], slip["end_time"]
         parts = [one.inside((start, end)) for one in samples(tree, realization)]
         count = sum(after - first for first, after in parts)

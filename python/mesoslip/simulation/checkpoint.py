@@ -76,7 +76,6 @@ class DamagedError(Exception):
 
 
 def checkpoint_folder(output: Path) -> Path:
-    """The folder of the checkpoint of an output."""
     return output.with_name(f"{output.stem}.checkpoint")
 
 

@@ -196,8 +196,6 @@ NO_ROWS = {table: Rows(len(columns)) for table, columns in COLUMNS.items()}
 
 
 class FirstRows:
-    """The first rows of a table."""
-
     def __init__(self, rows: Rows, count: int) -> None:
         self._rows, self._count = rows, count
         self.columns = rows.columns
@@ -206,7 +204,6 @@ class FirstRows:
         return self._count
 
     def blocks(self, max_rows: int) -> Iterator[Array]:
-        """See `Rows.blocks`."""
         remaining = self._count
         for block in self._rows.blocks(max_rows):
             if remaining == 0:
@@ -215,7 +212,6 @@ class FirstRows:
             remaining -= min(remaining, len(block))
 
     def read(self) -> Array:
-        """See `Rows.read`."""
         return np.concatenate([np.empty((0, self.columns)), *self.blocks(max(1, self._count))])
 
 
@@ -239,7 +235,6 @@ class SnapshotRows:
             yield self._shaped(values)
 
     def read(self) -> Array:
-        """All snapshots."""
         return self._shaped(self._rows.read())
 
 

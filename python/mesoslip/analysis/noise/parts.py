@@ -26,7 +26,6 @@ class Part:
 
     @property
     def samples(self) -> slice:
-        """The samples of the part."""
         return slice(self.first, self.after)
 
     def __len__(self) -> int:

@@ -178,7 +178,6 @@ class RateAndState:
         return slopes
 
     def bounds(self) -> tuple[Array, Array]:
-        """Bounds of the search."""
         near, far = self.distances[0] / MARGIN, self.distances[1] * MARGIN
         ranges = {
             "a": (MIN_A, MAX_A),

@@ -112,7 +112,6 @@ class SliderTable(Table):
 
     @property
     def layer_count(self) -> int:
-        """Number of layers of the slider."""
         return 1
 
     @property

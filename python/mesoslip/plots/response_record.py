@@ -57,8 +57,7 @@ def draw_record(axes: Axes, experiment: Experiment, scale: Scale) -> None:
         later = force[experiment.samples(steady).start + mean.start :]
         margin = 0.15 * max(float(np.ptp(later)), 1e-3)
         axes.set_ylim(later.min() - 2 * margin, later.max() + margin)
-    axes.set_xlabel(scale.label("displacement of the load point"))
-    axes.set_ylabel(unit.name)
+    axes.set(xlabel=scale.label("displacement of the load point"), ylabel=unit.name)
     for stage in experiment.stages[1 : MAX_MARKS + 1]:
         start = x[experiment.start_sample(stage)] / scale.size
         axes.axvline(start, color=BLUE if stage.is_hold else "0.8", linewidth=0.5, zorder=0)

@@ -133,13 +133,11 @@ def counting_interval(count: NDArray[np.int64]) -> Array:
 
 
 def _label_density(axes: Axes) -> None:
-    axes.set_xlabel("avalanche size $s$")
-    axes.set_ylabel("$P(s)$")
+    axes.set(xlabel="avalanche size $s$", ylabel="$P(s)$")
 
 
 def _label_cumulative(axes: Axes) -> None:
-    axes.set_xlabel("avalanche size $s$")
-    axes.set_ylabel("$P(S \\geq s)$")
+    axes.set(xlabel="avalanche size $s$", ylabel="$P(S \\geq s)$")
 
 
 VIEW = View(

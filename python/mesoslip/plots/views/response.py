@@ -108,8 +108,7 @@ def draw_healing(axes: Axes, data: Arrays) -> None:
         axes.plot(ends, (found.level + found.slope * np.log10(ends)) * scale, color=RED)
         slope = _slope(found, scale)
         write_title(axes, f"healing per decade of hold time = {slope}")
-    axes.set_xlabel("hold time (s)")
-    axes.set_ylabel("(peak - steady force) over $F_s$")
+    axes.set(xlabel="hold time (s)", ylabel="(peak - steady force) over $F_s$")
 
 
 def _slope(found: Line, scale: float) -> str:

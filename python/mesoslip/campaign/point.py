@@ -1,7 +1,4 @@
-"""A point: one realization of one combination, identical wherever it is computed.
-
-Points of a chain are computed together, as each starts from the end of the one before.
-"""
+"""A point: one realization of one combination, identical wherever it is computed."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Tables with units: columns of numbers under headers such as ``time [s]``, read strictly.
-
-Ambiguous numbers are refused; the message names the line and the fix.
-"""
+"""Tables of numbers under headers with units, such as ``time [s]``, read strictly."""
 
 from __future__ import annotations
 

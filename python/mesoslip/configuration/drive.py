@@ -1,8 +1,4 @@
-"""The drive: its tables in a file, and its parts of constant acceleration for the kernel.
-
-Every drive is a sequence of parts, in each of which the velocity changes linearly with time. Each
-part has the number of its stage.
-"""
+"""The drive: its tables in a file, and its parts of constant acceleration for the kernel."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""The renewal equation of slow forward sliding, solved by collocation on panels of equal width.
-
-The solver is ``fortran/theory/renewal.f90``; here its values become polynomials.
-"""
+"""The renewal equation of slow forward sliding, whose solution becomes polynomials of panels."""
 
 from __future__ import annotations
 

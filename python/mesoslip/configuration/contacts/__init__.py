@@ -1,7 +1,4 @@
-"""Kinds of contacts, each in a file of its own and listed here.
-
-Adding a kind is adding a file with a `ContactKind` and naming it in `KINDS`.
-"""
+"""Kinds of contacts, each in a file of its own and listed here."""
 
 from __future__ import annotations
 

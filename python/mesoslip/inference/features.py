@@ -9,6 +9,8 @@ from typing import Any, Literal, cast
 
 import numpy as np
 
+from mesoslip.text_rows import rows_of_text
+
 # Points of the waveform of a slip, in periods of the setup since the force fell by half.
 WAVEFORM = np.arange(-10, 51) / 20
 # Times of the comparison with linear loading, over the time of the first peak.
@@ -161,14 +163,9 @@ def features(scale: float, *, has_start: bool) -> Iterator[Feature]:
         yield replace(one, factor=scale) if scaled else one
 
 
-def _rows(text: str, **values: Any) -> Iterator[list[str]]:
-    """The cells of rows, with values in their places."""
-    for row in text.format(**values).strip().replace("\n    ", " ").splitlines():
-        yield [cell.strip() for cell in row.split("|")]
-
-
 def _features(text: str, **values: Any) -> Iterator[Feature]:
-    for name, group, kind, label, *others in _rows(text, **values):
+    """The features of a table, with values in their places."""
+    for name, group, kind, label, *others in rows_of_text(text.format(**values)):
         high, low, meaning = (*others, "", "", "")[:3]
         usual = f"logarithm of the {label}" if kind.startswith("log") else label
         yield Feature(name, group, meaning or usual, cast(Kind, kind), label, high, low)
@@ -196,7 +193,7 @@ def _start() -> Iterator[Feature]:
 
 def _slips() -> Iterator[Feature]:
     """Of slips, from one to the next, and of their shape."""
-    for name, kind, label, high, low, meaning in _rows(SLIPS):
+    for name, kind, label, high, low, meaning in rows_of_text(SLIPS):
         for part in ("mean", "median"):
             text = f"{part} of the {meaning}"
             yield Feature(f"{part}_{name}", "slips", text, cast(Kind, kind), label, high, low)

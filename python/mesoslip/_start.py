@@ -1,7 +1,4 @@
-"""Ctrl-C while the program starts: its end, without a traceback.
-
-Imports take most of the start, and what they raise when interrupted may be any exception.
-"""
+"""Ctrl-C while the program starts, mostly in imports, ends it without a traceback."""
 
 import os
 import signal

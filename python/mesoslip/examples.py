@@ -100,7 +100,6 @@ def example(name: str, file: PathLike | None = None) -> list[Path]:
 
 
 def _write_new(path: Path, contents: bytes) -> None:
-    """Write a new file."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         # Mode x: a file of that name may have been made in the meantime.

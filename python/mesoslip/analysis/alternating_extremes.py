@@ -57,10 +57,8 @@ class Extremes:
         return self.fall_sizes.size > 0 and bool(self.fall_sizes[-1] > threshold)
 
     def falls(self, threshold: float) -> tuple[Samples, Samples]:
-        """Samples of the maximum and of the minimum of each fall above a threshold.
-
-        Between neighbouring falls the trace rises by more than the threshold as well.
-        """
+        """Samples of the maximum and of the minimum of each fall above a threshold; the trace rises
+        by more than the threshold between neighbours."""
         kept = self._cycle_sizes > threshold
         # Differences of the rest increase, then decrease.
         large = np.flatnonzero(np.abs(np.diff(self.values[self.rest])) > threshold)
@@ -94,10 +92,8 @@ def extremes_of(values: Array, min_size: float = 0.0) -> Extremes:
 
 
 def _without_inner_cycles(values: Array, at: Samples, min_size: float) -> tuple[Samples, Samples]:
-    """Turning points without cycles of neighbours, and the large ones of these, shape (cycles, 2).
-
-    Such pairs have no point in common, and each pass removes most points of a noisy trace.
-    """
+    """Turning points without cycles of neighbours, and the large ones of these, shape (cycles, 2);
+    each pass removes most points of a noisy trace."""
     found = [np.empty((0, 2), dtype=int)]
     while at.size > MIN_POINTS:
         sizes = np.abs(np.diff(values[at]))

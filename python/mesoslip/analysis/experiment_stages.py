@@ -89,10 +89,8 @@ class Stage:
 
 @dataclass(frozen=True)
 class Peak:
-    """An extreme of the force [N] in each realization, with the displacement of the slider [m].
-
-    Arrays have the shape (realizations,).
-    """
+    """An extreme of the force [N] and the displacement of the slider [m] there, each of shape
+    (realizations,)."""
 
     force: Array
     time: Array
@@ -164,10 +162,8 @@ class Experiment:
         return self.apparatus.velocity * elapsed
 
     def _displacement(self, root: Dataset | Arrays, count: int) -> Array:
-        """Displacement of the slider [m]: recorded, or from load point and stretch of the spring.
-
-        If the stiffness is unknown, the stretch is taken as 0.
-        """
+        """Displacement of the slider [m]: recorded, or that of the load point less the stretch of
+        the spring, 0 if its stiffness is unknown."""
         if "displacement" in root:
             displacement: Array = root["displacement"].values[:, :count]
             if np.isfinite(displacement).any():
@@ -181,10 +177,8 @@ class Experiment:
         return math.nan if self.config is None else self.config.contacts.static_force
 
     def without_trend(self, trend: float) -> Experiment:
-        """The experiment without a linear trend of the force over the displacement of the slider.
-
-        The trend is in the unit of the force per metre.
-        """
+        """The experiment without a linear trend of the force over the displacement of the slider,
+        in the unit of the force per metre."""
         changed = copy.copy(self)
         changed.__dict__.pop("steady_means", None)
         moved = self.displacement - self.displacement[:, :1]
@@ -217,10 +211,8 @@ class Experiment:
 
     @property
     def peak_window(self) -> float:
-        """Displacement of the slider after a change of the drive within which its peak lies [m].
-
-        Infinite without a configuration: then the whole stage is searched.
-        """
+        """Displacement of the slider after a change of the drive within which its peak lies [m];
+        infinite without a configuration."""
         if self.config is None:
             return math.inf
         return PEAK_STRETCHES * self.config.contacts.break_stretch
@@ -298,10 +290,8 @@ class Experiment:
 
     @cached_property
     def steady_means(self) -> dict[int, SteadyMean | None]:
-        """Steady means of the spring force along the drive, by stage number.
-
-        Stages at constant velocity only; None for too few samples.
-        """
+        """Steady means of the spring force along the drive, by number of the stages at constant
+        velocity; None for too few samples."""
         return {
             one.number: steady_mean(one.direction * self.force[:, self.samples(one)])
             for one in self.stages

@@ -71,11 +71,7 @@ def write_quakeml(tree: DataTree, path: Path) -> None:
 
 
 def event_catalogue(tree: DataTree) -> Any:
-    """The slips of an output as an ``obspy.core.event.Catalog``.
-
-    A slip has an origin time and amplitudes: the drop of the force, the peak velocity, and the
-    duration.
-    """
+    """The slips of an output as an ``obspy.core.event.Catalog``: origin times and amplitudes."""
     try:
         from obspy import UTCDateTime
         from obspy.core import event

@@ -256,7 +256,6 @@ def first_front(tree: Tree) -> dict[str, float]:
 def _events(
     tree: Tree, fronts: Mapping[str, NDArray[Any]], spacing: float
 ) -> dict[str, NDArray[Any]]:
-    """Columns of the events."""
     owners = np.stack([fronts["realization_index"], fronts["event"]], axis=1)
     ends = np.append(np.flatnonzero(np.any(np.diff(owners, axis=0), axis=1)) + 1, len(owners))
     rows = [

@@ -97,10 +97,8 @@ class Catalogue:
 
     @property
     def statistics(self) -> dict[str, dict[str, float]]:
-        """Number of slips; mean, standard deviation, minimum and maximum of each column, in SI.
-
-        The first slip of a run counts too.
-        """
+        """Number of slips, with the first; mean, standard deviation, minimum and maximum of each
+        column, in SI."""
         count = float(len(self.columns["start_time"].values))
         result: dict[str, dict[str, float]] = {"slips": {"count": count}}
         for name in COLUMNS[3:]:
@@ -170,10 +168,8 @@ def _statistics(values: Mapping[str, float], unit: float) -> tuple[str, ...]:
 
 
 def catalogue_of(tree: Tree, realization: int | None = None) -> Catalogue:
-    """The catalogue of slips of an output of a run or a measured trace.
-
-    If a realization is given, it has the slips of that one, and the traces of others are not read.
-    """
+    """The slips of an output of a run or a measured trace, or of one realization, without reading
+    the traces of others."""
     data = group_of(tree, "slips")
     if realization is not None:
         rows = data["realization_index"].values

@@ -59,10 +59,8 @@ def stick_phases(
     drive: Array | None = None,
     stiffness: float = math.nan,
 ) -> StickPhases:
-    """The stick phases before the slips of a trace without impulses.
-
-    A stiffness that is NaN stands for the median of the loading stiffness.
-    """
+    """The stick phases before the slips of a trace without impulses; for an unknown stiffness, by
+    the median of the loading."""
     number = len(start_time)
     duration, rate, measured, driven, risen, rest = (np.full(number, np.nan) for _ in range(6))
     duration[1:] = start_time[1:] - end_time[:-1]
@@ -99,11 +97,8 @@ def stick_phases(
 def relieved_loading(
     time: Array, force: Array, start_time: Array, end_time: Array, force_before: Array
 ) -> tuple[float, float]:
-    """Sum of the falls of slips without their rebounds [N], and time of the loading [s].
-
-    The time is from the start of each slip to that of the next. Slips after which the slider does
-    not rest are left out of both.
-    """
+    """Sum of the falls of slips without their rebounds [N], and time of the loading from each slip
+    to the next [s], without slips after which the slider does not rest."""
     phases = stick_phases(time, force, start_time, end_time, force_before)
     falls = force_before[:-1] - phases.rest_force[1:]
     rests = np.isfinite(falls)

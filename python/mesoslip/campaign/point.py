@@ -1,7 +1,4 @@
-"""A point: one realization of one combination, identical wherever it is computed.
-
-Points of a chain are computed together, as each starts from the end of the one before.
-"""
+"""A point: one realization of one combination, identical wherever it is computed."""
 
 from __future__ import annotations
 
@@ -56,10 +53,8 @@ class Task:
 
 @dataclass(frozen=True)
 class Outcome:
-    """Measures of a point and its computing time [s], or the reason of its failure.
-
-    The trace is the content of the output file, if that is kept.
-    """
+    """Measures of a point, its computing time [s], and the content of the output file if that is
+    kept; or the reason of its failure."""
 
     measures: dict[str, float]
     seconds: float = 0.0
@@ -103,10 +98,8 @@ def point_name(key: str, realization: int) -> str:
 
 
 def compute(task: Task, stop: Stop) -> tuple[Outcome, ...]:
-    """Run the points of a chain and measure them.
-
-    Errors are reported in the outcomes. There are fewer outcomes than points after a stop.
-    """
+    """Run the points of a chain and measure them; errors are in the outcomes, of which a stop
+    leaves some out."""
     outcomes: list[Outcome] = []
     end: End | None = None
     for at in range(len(task.configs)):
@@ -133,10 +126,8 @@ def compute(task: Task, stop: Stop) -> tuple[Outcome, ...]:
 def _compute(
     task: Task, at: int, after: End | None, stop: Stop
 ) -> tuple[Outcome | None, End | None]:
-    """Run a point of a chain from the end of the one before.
-
-    Returns its outcome, None if it was stopped, and its end if another point follows.
-    """
+    """Run a point from the end of the one before: its outcome, None if stopped, and its end if
+    another point follows."""
     config = Config.from_dict(task.configs[at])
     if config.output.slip_interval is None and not task.trace:
         # No measure needs finer traces, and no file of the run is kept.

@@ -35,10 +35,8 @@ MAX_WAIT = 5.0
 
 @dataclass(frozen=True)
 class Sweep:
-    """The dataset of a sweep, the reasons of its failures by point, and numbers of its points.
-
-    Points were in the store, or computed, or are missing; then `ending` says why it ended early.
-    """
+    """The dataset of a sweep, its failures by point, numbers of stored, computed and missing
+    points, and why it ended early."""
 
     dataset: Dataset
     failures: dict[str, str]
@@ -55,10 +53,8 @@ class Sweep:
 
 @dataclass(frozen=True)
 class Group:
-    """Chains of combinations with the same points, such as those that differ only in their titles.
-
-    Each combination of a chain has a key, a hash of everything that determines its measures.
-    """
+    """Chains of combinations with the same points, each with a hash of everything that determines
+    its measures as its key."""
 
     keys: tuple[str, ...]
     chains: list[tuple[Combination, ...]]

@@ -206,10 +206,8 @@ class _Reader:
 def _spread(
     kind: KeyKind, ends: tuple[float, float], spacing: str, fractions: Iterable[float | Fraction]
 ) -> tuple[Value, ...]:
-    """Values at fractions of a range, whose ends are kept exactly.
-
-    Whole numbers are computed with fractions, as doubles have too few digits for large ones.
-    """
+    """Values at fractions of a range with exact ends; doubles have too few digits for large whole
+    numbers."""
     first, last = ends
     values: list[Value] = []
     for fraction in fractions:

@@ -144,10 +144,8 @@ class Plan:
 
     @cached_property
     def chains(self) -> tuple[tuple[Combination, ...], ...]:
-        """The combinations in chains, each run of which starts from the end of the one before.
-
-        Without `sweep.continue` each combination is a chain of its own.
-        """
+        """The combinations in chains, of which each run starts from the end of the one before; one
+        a chain without `sweep.continue`."""
         if self.sweep.continue_ is None:
             return tuple((one,) for one in self.combinations)
         return chained(self.combinations, self.axes, self.sweep)

@@ -20,10 +20,8 @@ RESERVED = {"status", "realization", "sample", "direction"}
 
 
 def find_measures(names: Sequence[str], source: str, folder: Path) -> tuple[Measure, ...]:
-    """The measures of names in a file, some of which may be "file.py:function" in a folder.
-
-    A `ConfigError` has all errors: unknown names, files that cannot be read or raise, repetitions.
-    """
+    """The measures of names in a file, some of which may be "file.py:function" in a folder; a
+    `ConfigError` has all errors."""
     found: list[Problem] = []
     measures: dict[str, Measure] = {}
     for number, name in enumerate(names):
@@ -78,10 +76,8 @@ def measure_of(name: str, source: str = "", path: str = "") -> Measure:
 
 @cache
 def _user_function(source: str, path: str, entry: str) -> Callable[[DataTree], Any]:
-    """A function of a user's file, which is run once in each process.
-
-    A `RunError` says where the file raised, or which function it may be that is missing.
-    """
+    """A function of a user's file, which is run once in each process; a `RunError` says what is
+    wrong with it."""
     names: dict[str, Any] = {"__name__": Path(path).stem, "__file__": path}
     try:
         exec(compile(source, path, "exec"), names)

@@ -14,6 +14,7 @@ from mesoslip.command_line.options import (
     OutputArgument,
     TableOption,
     counted,
+    option,
     positive_or_none,
     print_json,
     print_table,
@@ -37,11 +38,7 @@ def ends_of(rows: Sequence[Row], gap: Row) -> Sequence[Row]:
     return rows if len(rows) <= MANY else [*rows[:FIRST], gap, *rows[-LAST:]]
 
 
-def slips(
-    output: OutputArgument,
-    table: TableOption = None,
-    as_json: JsonOption = False,
-) -> None:
+def slips(output: OutputArgument, table: TableOption = None, as_json: JsonOption = False) -> None:
     """Print the catalogue of slips, with statistics."""
     from mesoslip.analysis import slips as catalogues
     from mesoslip.output import files, targets
@@ -94,21 +91,17 @@ def avalanches(
     as_json: JsonOption = False,
     min_size: Annotated[
         int | None,
-        typer.Option(
-            min=1, help="Minimum size in the fit; chosen from the data by default", metavar="SIZE"
-        ),
+        option("Minimum size in the fit; chosen from the data by default", "SIZE", min=1),
     ] = None,
-    after: Annotated[
-        str, typer.Option(help="Only avalanches after this time, such as '2 s'", metavar="TIME")
-    ] = "0 s",
+    after: Annotated[str, option("Only avalanches after this time, such as '2 s'", "TIME")] = "0 s",
     min_force_ratio: Annotated[
         float | None,
-        typer.Option(
+        option(
+            "Only avalanches at more than this fraction of the maximum contact force, and "
+            "before that maximum",
+            "RATIO",
             min=0,
             max=1,
-            help="Only avalanches at more than this fraction of the maximum contact force, and "
-            "before that maximum",
-            metavar="RATIO",
         ),
     ] = None,
 ) -> None:
@@ -215,29 +208,26 @@ def events(
     as_latex: LatexOption = False,
     catalogue: Annotated[
         str | None,
-        typer.Option(
+        option(
+            "Catalogue: slips, avalanches, or channel, the last of these by default",
+            "CATALOGUE",
             "--of",
-            help="Catalogue: slips, avalanches, or channel, the last of these by default",
-            metavar="CATALOGUE",
         ),
     ] = None,
     threshold: Annotated[
         float | None,
-        typer.Option(
+        option(
+            "Minimum amplitude of an event of the channel; from its noise by default",
+            "NUMBER",
             min=0,
-            help="Minimum amplitude of an event of the channel; from its noise by default",
-            metavar="NUMBER",
         ),
     ] = None,
     completeness: Annotated[
-        float | None,
-        typer.Option(help="Minimum log10(size) of the b-value; found by default", metavar="NUMBER"),
+        float | None, option("Minimum log10(size) of the b-value; found by default", "NUMBER")
     ] = None,
     main_size: Annotated[
         float | None,
-        typer.Option(
-            min=0, help="Minimum size of main events; the largest 5 % by default", metavar="SIZE"
-        ),
+        option("Minimum size of main events; the largest 5 % by default", "SIZE", min=0),
     ] = None,
 ) -> None:
     """Print b-value and Omori decay of events, and acoustic emission.
@@ -266,18 +256,15 @@ def plateaus(
     as_latex: LatexOption = False,
     signal: Annotated[
         str | None,
-        typer.Option(
-            help="Signal whose steps cut the record: speed, load or force; by default speed and "
+        option(
+            "Signal whose steps cut the record: speed, load or force; by default speed and "
             "load where they have steps",
-            metavar="SIGNAL",
+            "SIGNAL",
         ),
     ] = None,
     viscosity: Annotated[
         str | None,
-        typer.Option(
-            help="Viscosity of the lubricant, such as '90 mPa*s', for a Stribeck curve",
-            metavar="VISCOSITY",
-        ),
+        option("Viscosity of the lubricant, such as '90 mPa*s', for a Stribeck curve", "VISCOSITY"),
     ] = None,
 ) -> None:
     """Print the friction of each plateau of a record.
@@ -301,17 +288,10 @@ def strokes(
         bool, typer.Option("--latex", help="Print the means over cycles as a LaTeX table")
     ] = False,
     middle: Annotated[
-        str,
-        typer.Option(
-            help="Share of a stroke over which friction is averaged, in its middle",
-            metavar="SHARE",
-        ),
+        str, option("Share of a stroke over which friction is averaged, in its middle", "SHARE")
     ] = "80%",
     period: Annotated[
-        str | None,
-        typer.Option(
-            help="Time of a revolution of a disc, such as '0.92 s', or auto", metavar="TIME"
-        ),
+        str | None, option("Time of a revolution of a disc, such as '0.92 s', or auto", "TIME")
     ] = None,
 ) -> None:
     """Print strokes, cycles and revolutions of a reciprocating record.

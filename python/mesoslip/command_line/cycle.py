@@ -15,6 +15,7 @@ from mesoslip.command_line.options import (
     QuietOption,
     SetOption,
     load,
+    option,
     output_option,
     print_caveat,
     print_json,
@@ -44,19 +45,19 @@ def cycle(
     output: Annotated[Path | None, output_option("Write the cycle to a file")] = None,
     start: Annotated[
         str | None,
-        typer.Option(
-            help="Where to start: relaxed, steady, uniform, or an output of this command; by "
+        option(
+            "Where to start: relaxed, steady, uniform, or an output of this command; by "
             "default contacts.initial",
-            metavar="START",
+            "START",
         ),
     ] = None,
     continued: Annotated[
         str | None,
-        typer.Option(
-            "--continue",
-            help="Follow the motion over a key, up and down: KEY=FROM:TO:POINTS, logarithmically "
+        option(
+            "Follow the motion over a key, up and down: KEY=FROM:TO:POINTS, logarithmically "
             "spaced, such as drive.velocity=0.1um/s:10um/s:20",
-            metavar="KEY=FROM:TO:POINTS",
+            "KEY=FROM:TO:POINTS",
+            "--continue",
         ),
     ] = None,
     changes: SetOption = None,
@@ -87,13 +88,7 @@ def cycle(
 
 
 def _follow(
-    config: Config,
-    text: str,
-    start: str | None,
-    output: Path | None,
-    *,
-    as_json: bool,
-    quiet: bool,
+    config: Config, text: str, start: str | None, output: Path | None, *, as_json: bool, quiet: bool
 ) -> None:
     """Follow the motion over a key, and write and print its branches."""
     import xarray as xr

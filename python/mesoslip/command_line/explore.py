@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from mesoslip.command_line.options import SetOption, load
+from mesoslip.command_line.options import SetOption, load, option
 from mesoslip.errors import FileError
 
 EXAMPLE = "klein"
@@ -23,25 +23,18 @@ def explore(
     config: Annotated[
         str | None,
         typer.Argument(
-            help="TOML file or output to start from; the example klein by default",
-            metavar="CONFIG",
+            help="TOML file or output to start from; the example klein by default", metavar="CONFIG"
         ),
     ] = None,
     changes: SetOption = None,
     trace: Annotated[
         Path | None,
-        typer.Option(
-            help="Measured trace, an output of mesoslip trace, to draw beside the model",
-            metavar="TRACE.nc",
-        ),
+        option("Measured trace, an output of mesoslip trace, to draw beside the model", "TRACE.nc"),
     ] = None,
     port: Annotated[
         int,
-        typer.Option(
-            min=0,
-            max=65535,
-            help="Port; if it is in use the next free one; 0: any free port",
-            metavar="PORT",
+        option(
+            "Port; if it is in use the next free one; 0: any free port", "PORT", min=0, max=65535
         ),
     ] = 5006,
     browser: Annotated[

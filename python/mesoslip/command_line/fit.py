@@ -13,6 +13,7 @@ from mesoslip.command_line.options import (
     QuietOption,
     SetOption,
     interruptible,
+    option,
     output_option,
     print_json,
     print_table,
@@ -46,21 +47,15 @@ def fit(
     changes: SetOption = None,
     predict: Annotated[
         Path | None,
-        typer.Option(
-            "--predict",
-            help="Predict a trace that is not in the fit, into a file of its own",
-            metavar="OUT.nc",
+        option(
+            "Predict a trace that is not in the fit, into a file of its own", "OUT.nc", "--predict"
         ),
     ] = None,
     compare: Annotated[
-        bool,
-        typer.Option("--compare", help="Compare fits of the same traces by their predictions"),
+        bool, typer.Option("--compare", help="Compare fits of the same traces by their predictions")
     ] = False,
     predictions: Annotated[
-        int | None,
-        typer.Option(
-            help="Number of traces with --predict, at least 50; 60 by default", metavar="NUMBER"
-        ),
+        int | None, option("Number of traces with --predict, at least 50; 60 by default", "NUMBER")
     ] = None,
     workers: Annotated[int | None, workers_option("simulations")] = None,
     quiet: QuietOption = False,

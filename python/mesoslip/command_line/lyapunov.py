@@ -13,6 +13,7 @@ from mesoslip.command_line.options import (
     QuietOption,
     SetOption,
     load,
+    option,
     output_option,
     positive_or_none,
     print_json,
@@ -27,8 +28,7 @@ def lyapunov(
     changes: SetOption = None,
     twins: Annotated[int, typer.Option(help="Number of twins")] = 8,
     follow: Annotated[
-        str | None,
-        typer.Option(help="Time for which each twin is followed, such as '2 s'", metavar="TIME"),
+        str | None, option("Time for which each twin is followed, such as '2 s'", "TIME")
     ] = None,
     workers: Annotated[int | None, typer.Option(help="Twins at the same time")] = None,
     as_json: JsonOption = False,

@@ -43,19 +43,22 @@ class Work(NamedTuple):
     stop: Stop
 
 
+def option(
+    help_text: str, metavar: str | None, *names: str, **limits: Any
+) -> typer.models.OptionInfo:
+    """An option with a value, which the metavar stands for."""
+    made: typer.models.OptionInfo = typer.Option(*names, help=help_text, metavar=metavar, **limits)
+    return made
+
+
 def output_option(help_text: str, metavar: str = "OUT.nc") -> typer.models.OptionInfo:
     """The option of the file that a command writes."""
-    option: typer.models.OptionInfo = typer.Option(
-        "-o", "--output", help=help_text, metavar=metavar
-    )
-    return option
+    return option(help_text, metavar, "-o", "--output")
 
 
 def workers_option(parallel: str) -> typer.models.OptionInfo:
     """The option of a number of workers, with the name of what they do at the same time."""
-    help_text = f"Parallel {parallel}; the number of processors by default"
-    option: typer.models.OptionInfo = typer.Option(min=1, help=help_text)
-    return option
+    return option(f"Parallel {parallel}; the number of processors by default", None, min=1)
 
 
 ConfigArgument = Annotated[
@@ -68,37 +71,37 @@ OutputsArgument = Annotated[
 SavedOption = Annotated[Path | None, output_option("Output file; out/<stem>.nc by default")]
 SetOption = Annotated[
     list[str] | None,
-    typer.Option(
+    option(
+        "Set a key, as in contacts.delay=1ms; KEY=none removes it; may be repeated",
+        "KEY=VALUE",
         "--set",
-        help="Set a key, as in contacts.delay=1ms; KEY=none removes it; may be repeated",
-        metavar="KEY=VALUE",
     ),
 ]
 SchedulerOption = Annotated[
     str | None,
-    typer.Option(
+    option(
+        "Address or scheduler file of a Dask scheduler, whose workers compute",
+        "ADDRESS",
         "--scheduler",
-        help="Address or scheduler file of a Dask scheduler, whose workers compute",
-        metavar="ADDRESS",
     ),
 ]
 PoolOption = Annotated[
     str | None,
-    typer.Option(
-        "--pool",
-        help="Workers: threads, processes, or both (default): threads at first, processes if the "
+    option(
+        "Workers: threads, processes, or both (default): threads at first, processes if the "
         "sweep takes long",
-        metavar="POOL",
+        "POOL",
+        "--pool",
     ),
 ]
 TableOption = Annotated[
     Path | None,
-    typer.Option(
+    option(
+        "Write the table to a file: .md for Markdown, .tex for LaTeX with booktabs, otherwise "
+        "comma-separated values in SI units",
+        "FILE",
         "--table",
         "--csv",
-        help="Write the table to a file: .md for Markdown, .tex for LaTeX with booktabs, otherwise "
-        "comma-separated values in SI units",
-        metavar="FILE",
     ),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON, in SI units")]

@@ -12,7 +12,7 @@ import typer
 from typer.core import TyperCommand, TyperOption
 
 from mesoslip.array_packages import hidden
-from mesoslip.command_line.options import OutputsArgument, output_option, time_of
+from mesoslip.command_line.options import OutputsArgument, option, output_option, time_of
 from mesoslip.command_line.progress import progress_shown
 from mesoslip.command_line.quick_matplotlib import import_matplotlib
 
@@ -72,9 +72,9 @@ class PlotCommand(TyperCommand):
 
     def complete_help(self) -> None:
         """Add the views to the help of ``--view``."""
-        for option in self.params:
-            if isinstance(option, TyperOption) and option.name == "view":
-                option.help = f"{VIEW_HELP}. {summary_of_views()}"
+        for one in self.params:
+            if isinstance(one, TyperOption) and one.name == "view":
+                one.help = f"{VIEW_HELP}. {summary_of_views()}"
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
         self.complete_help()
@@ -95,29 +95,25 @@ def plot(
         Path | None,
         output_option("Picture, beside the first output by default; .gif, .mp4: a movie", "FIG"),
     ] = None,
-    view: Annotated[str | None, typer.Option(help=VIEW_HELP, metavar="VIEW")] = None,
+    view: Annotated[str | None, option(VIEW_HELP, "VIEW")] = None,
     snapshot: Annotated[
         int | None,
-        typer.Option(
+        option(
+            "Snapshot of the lattice; by default the one after the largest avalanche",
+            "NUMBER",
             min=0,
-            help="Snapshot of the lattice; by default the one after the largest avalanche",
-            metavar="NUMBER",
         ),
     ] = None,
     realization: Annotated[
         int | None,
-        typer.Option(
+        option(
+            "Realization of a run; by default the first one, in front of the others",
+            "NUMBER",
             min=0,
-            help="Realization of a run; by default the first one, in front of the others",
-            metavar="NUMBER",
         ),
     ] = None,
-    start: Annotated[
-        str | None, typer.Option("--from", help="Time, such as '2 s'", metavar="TIME")
-    ] = None,
-    end: Annotated[
-        str | None, typer.Option("--to", help="Time, such as '2.5 s'", metavar="TIME")
-    ] = None,
+    start: Annotated[str | None, option("Time, such as '2 s'", "TIME", "--from")] = None,
+    end: Annotated[str | None, option("Time, such as '2.5 s'", "TIME", "--to")] = None,
     x: Annotated[
         Against | None,
         typer.Option(
@@ -126,41 +122,34 @@ def plot(
     ] = None,
     file_format: Annotated[
         str | None,
-        typer.Option(
+        option(
+            "Format, such as png, pdf, svg or eps; by default that of the ending of FIG",
+            "FORMAT",
             "--format",
-            help="Format, such as png, pdf, svg or eps; by default that of the ending of FIG",
-            metavar="FORMAT",
         ),
     ] = None,
     width: Annotated[
         str | None,
-        typer.Option(
-            help="Width in print, such as '8.6 cm', or a column of a journal with its size of the "
+        option(
+            "Width in print, such as '8.6 cm', or a column of a journal with its size of the "
             "font: aps-1, aps-2, elsevier-1, elsevier-1.5, elsevier-2, nature-1, nature-2",
-            metavar="LENGTH",
+            "LENGTH",
         ),
     ] = None,
     font_size: Annotated[
         float | None,
-        typer.Option(
-            help="Size of the font in points; by default that of the journal, or 8", metavar="PT"
-        ),
+        option("Size of the font in points; by default that of the journal, or 8", "PT"),
     ] = None,
     title: Annotated[
         str | None,
-        typer.Option(
-            help="Title instead of those of the outputs; '' for none, as above a caption",
-            metavar="TEXT",
-        ),
+        option("Title instead of those of the outputs; '' for none, as above a caption", "TEXT"),
     ] = None,
     letters: Annotated[
         bool, typer.Option("--letters", help="Letter the panels (a), (b), and so on")
     ] = False,
     style: Annotated[
         Path | None,
-        typer.Option(
-            help="Style file of matplotlib (.mplstyle), on top of that of mesoslip", metavar="FILE"
-        ),
+        option("Style file of matplotlib (.mplstyle), on top of that of mesoslip", "FILE"),
     ] = None,
 ) -> None:
     """Draw an output, or several in one picture."""

@@ -13,6 +13,7 @@ from mesoslip.command_line.options import (
     QuietOption,
     TableOption,
     interruptible,
+    option,
     output_option,
     positive_or_none,
     print_json,
@@ -32,10 +33,7 @@ def response(
     table: TableOption = None,
     as_json: JsonOption = False,
     normal_force: Annotated[
-        str | None,
-        typer.Option(
-            help="Normal force for friction coefficients, such as '10 mN'", metavar="FORCE"
-        ),
+        str | None, option("Normal force for friction coefficients, such as '10 mN'", "FORCE")
     ] = None,
     fit: Annotated[bool, typer.Option(help="Fit rate-and-state parameters")] = True,
     free_stiffness: Annotated[
@@ -65,18 +63,12 @@ def response(
     ] = None,
     law: Annotated[
         list[str] | None,
-        typer.Option(
-            help="Law of the posterior, such as slip or 'slip, two states'; may be repeated",
-            metavar="LAW",
-        ),
+        option("Law of the posterior, such as slip or 'slip, two states'; may be repeated", "LAW"),
     ] = None,
     samples: Annotated[
-        int | None,
-        typer.Option(help="Draws of the posterior of each law; 4000 by default", metavar="NUMBER"),
+        int | None, option("Draws of the posterior of each law; 4000 by default", "NUMBER")
     ] = None,
-    seed: Annotated[
-        int | None, typer.Option(help="Seed of the posterior; 1 by default", metavar="NUMBER")
-    ] = None,
+    seed: Annotated[int | None, option("Seed of the posterior; 1 by default", "NUMBER")] = None,
     quiet: QuietOption = False,
 ) -> None:
     """Print velocity steps, holds, steady forces, rate and state."""

@@ -17,6 +17,7 @@ from mesoslip.command_line.options import (
     counted,
     executor_of,
     load,
+    option,
     quantity,
     workers_option,
 )
@@ -49,10 +50,10 @@ def run(
     ] = False,
     checkpoint_interval: Annotated[
         str,
-        typer.Option(
-            help="Wall time between checkpoints, such as '30 s'; 0: a checkpoint only when the run "
+        option(
+            "Wall time between checkpoints, such as '30 s'; 0: a checkpoint only when the run "
             "is stopped",
-            metavar="TIME",
+            "TIME",
         ),
     ] = "60 s",
     workers: Annotated[int | None, workers_option("realizations")] = None,

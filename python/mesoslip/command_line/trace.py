@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mesoslip.command_line.options import SavedOption, counted, workers_option
+from mesoslip.command_line.options import SavedOption, counted, option, workers_option
 from mesoslip.command_line.progress import progress_shown, say, steps_shown
 from mesoslip.errors import ConfigError, Problem
 
@@ -18,12 +18,8 @@ if TYPE_CHECKING:
 
 # Maximum number of files whose errors are printed.
 MAX_REPORTED = 5
-
-
-def _option(help_text: str, example: str, name: str | None = None) -> typer.models.OptionInfo:
-    names = () if name is None else (name,)
-    option: typer.models.OptionInfo = typer.Option(*names, help=help_text, metavar=f"'{example}'")
-    return option
+# Options that do not describe the measurement.
+NOT_DESCRIBING = {"files", "output", "batch", "workers", "dry_run", "verbose"}
 
 
 def trace(
@@ -38,90 +34,80 @@ def trace(
     output: SavedOption = None,
     config: Annotated[
         str | None,
-        typer.Option(
-            "--config",
-            help="Configuration of a model of the experiment, which `fit` needs",
-            metavar="CONFIG",
+        option(
+            "Configuration of a model of the experiment, which `fit` needs", "CONFIG", "--config"
         ),
     ] = None,
     columns: Annotated[
         str | None,
-        typer.Option(
-            help="Headers that replace those of the file, such as 'time [s], force [uN], -'",
-            metavar="HEADERS",
+        option(
+            "Headers that replace those of the file, such as 'time [s], force [uN], -'", "HEADERS"
         ),
     ] = None,
-    decimal: Annotated[
-        str | None, typer.Option(help="Decimal sign, if the file allows two", metavar="','")
-    ] = None,
+    decimal: Annotated[str | None, option("Decimal sign, if the file allows two", "','")] = None,
     sheet: Annotated[
-        str | None,
-        typer.Option(
-            help="Sheet of a workbook; that with the most numbers by default", metavar="NAME"
-        ),
+        str | None, option("Sheet of a workbook; that with the most numbers by default", "NAME")
     ] = None,
     rate: Annotated[
         str | None,
-        _option("Sampling rate, if the file has no times; else samples are thinned to it", "1 kHz"),
+        option(
+            "Sampling rate, if the file has no times; else samples are thinned to it", "'1 kHz'"
+        ),
     ] = None,
     velocity: Annotated[
-        str | None, _option("Velocity of the drive, if no load point was recorded", "42 um/s")
+        str | None, option("Velocity of the drive, if no load point was recorded", "'42 um/s'")
     ] = None,
     stiffness: Annotated[
         str | None,
-        _option("Spring constant; of friction coefficients as in '1.6e-3 1/um'", "1002 N/m"),
+        option("Spring constant; of friction coefficients as in '1.6e-3 1/um'", "'1002 N/m'"),
     ] = None,
     radius: Annotated[
         str | None,
-        _option("Radius of the track: torques become forces, rotations speeds", "30 mm"),
+        option("Radius of the track: torques become forces, rotations speeds", "'30 mm'"),
     ] = None,
     viscosity: Annotated[
-        str | None, _option("Viscosity of a lubricant, for Stribeck curves", "90 mPa*s")
+        str | None, option("Viscosity of a lubricant, for Stribeck curves", "'90 mPa*s'")
     ] = None,
     motion: Annotated[
         str | None,
-        typer.Option(
-            help="Whether the drive goes back and forth: strokes, one-way; found by default",
-            metavar="MOTION",
+        option(
+            "Whether the drive goes back and forth: strokes, one-way; found by default", "MOTION"
         ),
     ] = None,
     normal_force: Annotated[
-        str | None, _option("Normal force; friction coefficients become forces", "301 mN")
+        str | None, option("Normal force; friction coefficients become forces", "'301 mN'")
     ] = None,
-    normal_stress: Annotated[str | None, _option("Normal stress, with --area", "20 MPa")] = None,
-    area: Annotated[str | None, _option("Area by which stresses become forces", "25 cm^2")] = None,
-    start: Annotated[str | None, _option("Time from which samples are used", "100 s")] = None,
-    end: Annotated[str | None, _option("Time until which samples are used", "160 s")] = None,
-    hum: Annotated[str | None, _option("Frequency of mains hum to remove", "50 Hz")] = None,
+    normal_stress: Annotated[str | None, option("Normal stress, with --area", "'20 MPa'")] = None,
+    area: Annotated[str | None, option("Area by which stresses become forces", "'25 cm^2'")] = None,
+    start: Annotated[str | None, option("Time from which samples are used", "'100 s'")] = None,
+    end: Annotated[str | None, option("Time until which samples are used", "'160 s'")] = None,
+    hum: Annotated[str | None, option("Frequency of mains hum to remove", "'50 Hz'")] = None,
     trend: Annotated[
         str | None,
-        typer.Option(
-            help="Trend of the friction with displacement, for rates and states: none, linear",
-            metavar="TREND",
+        option(
+            "Trend of the friction with displacement, for rates and states: none, linear", "TREND"
         ),
     ] = None,
     noise: Annotated[
-        str | None, _option("Standard deviation of the noise; estimated by default", "0.1 uN")
+        str | None, option("Standard deviation of the noise; estimated by default", "'0.1 uN'")
     ] = None,
     min_fall: Annotated[
-        str | None, _option("Minimum fall of a slip; from the noise by default", "6 mN")
+        str | None, option("Minimum fall of a slip; from the noise by default", "'6 mN'")
     ] = None,
-    period: Annotated[str | None, _option("Period of the setup, if it is known", "25 ms")] = None,
+    period: Annotated[str | None, option("Period of the setup, if it is known", "'25 ms'")] = None,
     part: Annotated[
         int | None,
-        typer.Option(
-            min=1,
-            help="Which part of a file whose clock restarts; the longest by default",
-            metavar="NUMBER",
+        option(
+            "Which part of a file whose clock restarts; the longest by default", "NUMBER", min=1
         ),
     ] = None,
     batch: Annotated[
         Path | None,
-        typer.Option(
-            "--batch",
-            help="Read each file by itself, into a folder (-o; out by default), and write a table "
+        option(
+            "Read each file by itself, into a folder (-o; out by default), and write a table "
             "with a row for each; an EXPERIMENT.toml before the files describes all",
-            metavar="TABLE.csv",
+            "TABLE.csv",
+            "--batch",
         ),
     ] = None,
     workers: Annotated[int | None, workers_option("files with --batch")] = None,
@@ -136,33 +122,12 @@ def trace(
 
     The file is read as the laboratory wrote it; the output is like that of a run.
     """
+    options: dict[str, Any] = {k: one for k, one in locals().items() if k not in NOT_DESCRIBING}
+    options["headers"] = options.pop("columns")
     from mesoslip.measured.batch import output_name
     from mesoslip.measured.trace import trace_of, understand
     from mesoslip.output import targets, writing
 
-    options: dict[str, Any] = {
-        "config": config,
-        "headers": columns,
-        "decimal": decimal,
-        "sheet": sheet,
-        "rate": rate,
-        "velocity": velocity,
-        "stiffness": stiffness,
-        "radius": radius,
-        "viscosity": viscosity,
-        "motion": motion,
-        "normal_force": normal_force,
-        "normal_stress": normal_stress,
-        "area": area,
-        "start": start,
-        "end": end,
-        "hum": hum,
-        "trend": trend,
-        "noise": noise,
-        "period": period,
-        "part": part,
-        "min_fall": min_fall,
-    }
     if batch is not None:
         raise typer.Exit(_read_each(files, output or Path("out"), batch, options, workers, dry_run))
     path = output or Path("out") / output_name(files[0])

@@ -107,7 +107,6 @@ def check_choice(key: str, value: str | None, choices: Iterable[str]) -> None:
 
 
 def function(value: Any) -> Any:
-    """A function."""
     if not callable(value) or isinstance(value, type):
         raise ValueError("must be a function")
     return value
@@ -173,7 +172,6 @@ table = instance(Mapping, "nested tables")
 
 
 def changes(value: Any) -> tuple[Any, ...]:
-    """Changes of a configuration."""
     wanted = 'must be changes such as "contacts.delay=1ms", or tables, in a list'
     if isinstance(value, str | bytes | Mapping) or not isinstance(value, Iterable):
         raise ValueError(wanted)

@@ -1,7 +1,4 @@
-"""Tables with units: columns of numbers under headers such as ``time [s]``, read strictly.
-
-Ambiguous numbers are refused; the message names the line and the fix.
-"""
+"""Tables of numbers under headers with units, such as ``time [s]``, read strictly."""
 
 from __future__ import annotations
 
@@ -49,10 +46,8 @@ class Cells:
 
 
 def cells_of(text: str, source: str) -> Cells:
-    """A table as text: columns separated by comma, semicolon, tab or spaces.
-
-    Lines that are empty or start with ``#`` are skipped; there must be others.
-    """
+    """A table as text, with columns between commas, semicolons, tabs or spaces; empty lines and
+    those after ``#`` are skipped."""
     lines = [
         (number, line.strip(" \r"))
         for number, line in enumerate(text.removeprefix("\ufeff").split("\n"), 1)
@@ -94,11 +89,8 @@ def _is_number(cell: str, delimiter: str) -> bool:
 def find_columns(
     headers: Sequence[str], known: Mapping[str, Quantity], source: str
 ) -> dict[str, FoundColumn]:
-    """The columns of known quantities, by the name of the quantity; others are not read.
-
-    Keys of ``known`` are names of headers in lower case, with underscores for spaces. A column that
-    occurs twice, or has no unit or a wrong one, is refused.
-    """
+    """The columns of known quantities, by name; one that occurs twice, or without a unit of its
+    dimension, is refused."""
     places: dict[str, FoundColumn] = {}
     for column, header in enumerate(headers):
         match = HEADER.fullmatch(header)
@@ -125,11 +117,8 @@ def find_columns(
 def values_of(
     cells: Cells, headers: Sequence[str], places: Mapping[str, FoundColumn]
 ) -> dict[str, list[float]]:
-    """Values in SI of the columns in ``places``, see `find_columns`.
-
-    A row with more cells than there are headers is refused, and a cell that is missing or not one
-    unambiguous finite number.
-    """
+    """Values in SI of the columns in ``places``, see `find_columns`; missing or ambiguous numbers
+    and cells beyond the headers are refused."""
     values: dict[str, list[float]] = {name: [] for name in places}
     decimal = "." if cells.delimiter == "," else _decimal_of(cells, places.values())
     for number, line in cells.lines:
@@ -156,10 +145,8 @@ POINT = "; numbers have a decimal point, and a comma would begin another cell"
 
 
 def _decimal_of(cells: Cells, places: Iterable[FoundColumn]) -> str:
-    """The decimal sign of a table in which commas do not separate columns.
-
-    It is a comma if some number has a comma that cannot group thousands, and no number has a point.
-    """
+    """The decimal sign of a table: a comma if one cannot group thousands, and no number has a
+    point."""
     columns = [place.column for place in places]
     has_comma = False
     for number, line in cells.lines:

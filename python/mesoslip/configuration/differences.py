@@ -39,10 +39,8 @@ class Difference(NamedTuple):
 
 
 def differences(configs: Sequence[Config]) -> list[Difference]:
-    """The keys whose values differ, in the order of the file; titles do not count.
-
-    A key that some of the configurations do not have counts as a difference.
-    """
+    """The keys whose values differ or that some do not have, in the order of the file; titles do
+    not count."""
     tables = [flat(config) for config in configs]
     keys = dict.fromkeys(key for table in tables for key in table if key != "title")
     found = []

@@ -1,8 +1,4 @@
-"""The drive: its tables in a file, and its parts of constant acceleration for the kernel.
-
-Every drive is a sequence of parts, in each of which the velocity changes linearly with time. Each
-part has the number of its stage.
-"""
+"""The drive: its tables in a file, and its parts of constant acceleration for the kernel."""
 
 from __future__ import annotations
 
@@ -166,7 +162,6 @@ class Stage(Table):
 
     @property
     def is_force(self) -> bool:
-        """Whether a force is prescribed."""
         return self.force is not None or self._is_ramp("force")
 
     @property

@@ -18,10 +18,8 @@ from mesoslip.configuration.units import cf_units
 
 @dataclass(frozen=True)
 class KeyKind:
-    """The kind of value of a key, with an example; ``unit`` is None for whole numbers and names.
-
-    A key whose value is a list or a table is not single.
-    """
+    """The kind of value of a key, with an example; ``unit`` is None for whole numbers and names,
+    lists and tables are not single."""
 
     unit: str | None
     example: str
@@ -80,7 +78,6 @@ def key_kind(key: str) -> KeyKind | None:
 
 
 def _parts(annotation: Any) -> Iterator[Any]:
-    """All parts of an annotation."""
     yield annotation
     for part in get_args(annotation):
         yield from _parts(part)

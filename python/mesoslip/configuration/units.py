@@ -99,11 +99,8 @@ def _with_comma(text: str, decimal: str) -> str:
 
 
 def to_si(value: object, unit: str, example: str) -> float:
-    """A quantity as a plain number in an SI unit such as "N/m".
-
-    It is a number in that unit, or a string with one number and one unit. The `ValueError` for
-    other values has the example of a right one.
-    """
+    """A number in an SI unit, or a string with one number and one unit, as a plain number; the
+    `ValueError` for others has the example."""
     wanted = f"expected a quantity such as {example!r}, or a number in {unit}"
     if isinstance(value, bool) or not isinstance(value, Real | str):
         raise ValueError(wanted)

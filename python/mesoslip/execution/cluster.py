@@ -78,10 +78,8 @@ def _quiet() -> Iterator[None]:
 
 
 class ClusterPool(Pool):
-    """The workers of a cluster; a piece whose worker is lost is computed by another one.
-
-    A piece that ended several workers fails with the error of `distributed` for that.
-    """
+    """The workers of a cluster; a piece whose worker is lost moves to another one, and fails after
+    several."""
 
     def __init__(self, client: Client) -> None:
         self._client = client

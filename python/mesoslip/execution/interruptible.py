@@ -13,10 +13,8 @@ CHECK_SECONDS = 0.1
 
 
 def interruptible(function: Callable[..., Result], *arguments: Any) -> Result:
-    """Call a function that frees Python's lock on a thread, and wait for it.
-
-    An interrupt leaves the thread at work; it ends with its call or with the program.
-    """
+    """Call a function that frees Python's lock on a thread, and wait for it; an interrupt leaves
+    the thread at work."""
     if threading.current_thread() is not threading.main_thread():
         return function(*arguments)
     results: list[Result] = []

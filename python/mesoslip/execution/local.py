@@ -67,10 +67,8 @@ class WorkerProcess:
             signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
 
     def compute(self, function: Function[Any, Any], piece: object) -> tuple[bool, Any]:
-        """Compute a piece in the process: whether that succeeded, and the result or the error.
-
-        Raises an `OSError` or `EOFError` if the process has died.
-        """
+        """Compute a piece: whether that succeeded, and the result or the error; an `OSError` or
+        `EOFError` if the process has died."""
         self._connection.send((compute_elsewhere, (function, piece, program())))
         answer: tuple[bool, Any] = self._connection.recv()
         return answer
@@ -102,10 +100,8 @@ def search_path() -> list[str]:
 
 
 class LocalPool(Pool):
-    """Threads and processes of this machine.
-
-    Pieces that start in the first ``thread_seconds`` [s] are computed by threads, with the stop.
-    """
+    """Threads and processes of this machine; threads compute what starts in the first
+    ``thread_seconds`` [s]."""
 
     def __init__(self, workers: int, stop: Stop, thread_seconds: float) -> None:
         self._workers = workers

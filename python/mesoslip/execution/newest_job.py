@@ -16,10 +16,8 @@ Job = Callable[[Stop], None]
 
 
 class NewestJob:
-    """A thread for jobs, each of which stops or replaces the job before it.
-
-    A job starts after ``delay`` [s] without a newer one. A failed job does not end the thread.
-    """
+    """A thread for jobs, each of which stops or replaces the one before, after ``delay`` [s]
+    without a newer one."""
 
     def __init__(self, delay: float = 0.0) -> None:
         self._delay = delay

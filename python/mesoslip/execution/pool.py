@@ -48,10 +48,7 @@ class Pool(ABC):
 
 
 def compute_elsewhere(function: Function[Any, Result], piece: object, wanted: str) -> Result:
-    """Compute a piece in another process, which must run the wanted program.
-
-    Its stop is never set: to stop it, the process is ended.
-    """
+    """Compute a piece in another process of the wanted program, which is ended to stop it."""
     if wanted != program():
         raise RunError(f"the worker has {program()}, not {wanted}")
     return function(piece, Stop())

@@ -10,10 +10,8 @@ from typing import IO
 
 
 def open_regular(path: Path, mode: str) -> IO[bytes]:
-    """Open a regular file: "rb", "r+b", or "xb" for a new file in the place of an old one.
-
-    Raises an `OSError` for a link or another object.
-    """
+    """Open a regular file, "rb", "r+b", or "xb" for a new one in the place of an old one; an
+    `OSError` for links and other objects."""
     if mode == "xb":
         path.unlink(missing_ok=True)
     return open(path, mode, opener=regular_descriptor)

@@ -31,10 +31,8 @@ class StopRequest(Protocol):
 
 
 class Stop:
-    """A request to stop soon, also set if the outer one is; ``signal`` is the signal that set it.
-
-    Unlike an event, it may be set by a signal handler.
-    """
+    """A request to stop soon, also set if the outer one is, and by a signal handler; ``signal`` is
+    the one that set it."""
 
     def __init__(self, outer: StopRequest | None = None) -> None:
         self._is_set = False
@@ -42,11 +40,9 @@ class Stop:
         self.signal: signal.Signals | None = None
 
     def set(self) -> None:
-        """Request a stop."""
         self._is_set = True
 
     def is_set(self) -> bool:
-        """Whether a stop is requested."""
         return self._is_set or (self._outer is not None and self._outer.is_set())
 
     def wait(self, seconds: float) -> bool:

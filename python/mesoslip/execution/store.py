@@ -98,10 +98,8 @@ class Folder:
         )
 
     def lock(self) -> None:
-        """Make the folder and lock it for this process.
-
-        Raises a `FileError` if another process writes to it, an `OSError` if it cannot be made.
-        """
+        """Make and lock the folder: a `FileError` if another process writes to it, an `OSError` if
+        it cannot be made."""
         if self._lock is not None:
             return
         while True:
@@ -210,7 +208,6 @@ class Pieces:
         self.path = path
 
     def names(self) -> set[str]:
-        """Names of the pieces."""
         try:
             return {one.stem for one in self.path.iterdir() if NAME.fullmatch(one.name) is not None}
         except FileNotFoundError:

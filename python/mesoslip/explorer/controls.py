@@ -68,7 +68,6 @@ class Control:
 
     @property
     def meaning(self) -> str:
-        """The meaning of the key."""
         return self.own_meaning or meaning(self.key)
 
     @property
@@ -118,7 +117,6 @@ class Scale:
     is_whole: bool
 
     def value(self, position: float) -> float:
-        """The value at a position."""
         part = min(max(position / STEPS, 0.0), 1.0)
         if part == 1:
             value = self.high
@@ -149,10 +147,8 @@ MAX_RATIO_KEPT, MAX_RATIO = 2.0, 1.2
 
 
 def lattice_size(count: int, lattice: str) -> tuple[int, int]:
-    """Columns and rows of a lattice of N contacts whose sides differ by a factor of 2 at most.
-
-    If N has none, the lattice is nearly square, and its number of contacts the nearest one.
-    """
+    """Columns and rows of a lattice of N contacts whose sides differ by a factor of 2 at most, or
+    else of nearly N, nearly square."""
     height = ROW_HEIGHTS[lattice]
     step = 2 if lattice == "triangular" else 1
 

@@ -13,10 +13,8 @@ from bokeh.models import ColumnDataSource, CustomJS
 
 
 class Elements:
-    """What the elements of the page show, by their names, and the requests of its user.
-
-    A request has an action, the name of an element, and a value.
-    """
+    """Contents of the elements of the page by their names, and requests of its user: action,
+    element and value."""
 
     def __init__(self, asked: Callable[[str, str, Any], None]) -> None:
         self._shown: dict[str, Mapping[str, Any]] = {}

@@ -52,7 +52,6 @@ POLICY = (
 
 
 def _part(name: str) -> str:
-    """A part of the page."""
     return files("mesoslip.explorer").joinpath(name).read_text("utf-8")
 
 
@@ -63,10 +62,8 @@ TEMPLATE = ENVIRONMENT.from_string(_part("page.html"))
 
 
 class Pages(Handler):
-    """Builds the page of a new tab on another thread, while the server answers other tabs.
-
-    One page is built at a time: several would take as long together, and slow the server down.
-    """
+    """Builds the page of a new tab, one at a time, on another thread, while the server answers
+    other tabs."""
 
     def __init__(self, config: Config, source: str, trace: Measured | None = None) -> None:
         super().__init__()
@@ -185,11 +182,8 @@ def serve(
     opens: bool,
     report: Callable[[str], None],
 ) -> None:
-    """Serve the page until the program is interrupted, and report its address.
-
-    It starts from a configuration, named by its source on the command line, at the first free port
-    from a given one, and may open a browser.
-    """
+    """Serve the page at the first free port from a given one until the program is interrupted, and
+    report its address."""
     # Of connections that end in the midst of a message.
     warnings.filterwarnings("ignore", r"coroutine .* was never awaited", RuntimeWarning)
     server = make_server(config, source, port, trace)

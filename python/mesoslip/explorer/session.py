@@ -33,10 +33,8 @@ ONE_MOVE = 1.0
 
 
 class Session:
-    """A configuration with changes to it.
-
-    A change with errors is taken back, unless there was nothing yet that can be run.
-    """
+    """A configuration with changes; one with errors is taken back, unless there was nothing yet
+    that can be run."""
 
     def __init__(self, start: Config, source: str) -> None:
         self._home = Setting(start, source, {})
@@ -112,10 +110,8 @@ class Session:
         return self._restored(changes, is_new=False)
 
     def change(self, key: str, text: str) -> bool:
-        """Change a key to a value as for ``--set``; the value at the start removes the change.
-
-        Returns whether the configuration can be run with all changes.
-        """
+        """Change a key as for ``--set``, or back to its value at the start; whether the
+        configuration can be run with all changes."""
         control = BY_KEY[key]
         self._before, self._last = dict(self.changes), key
         self.notes = {}

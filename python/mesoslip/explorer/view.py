@@ -70,10 +70,7 @@ FOUND = "document.body.classList.remove('lost')"
 
 
 class Page:
-    """The page of one tab, with its own changes and runs.
-
-    It starts with the configuration of a link, if its query is given and right.
-    """
+    """The page of one tab, with its own changes and runs, which may start from a link."""
 
     def __init__(
         self,

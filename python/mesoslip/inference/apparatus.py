@@ -54,10 +54,7 @@ def declared_values(tree: DataTree) -> dict[str, float]:
 
 
 def own_config(declared: Mapping[str, float], plan: Plan) -> Config:
-    """The configuration with the apparatus of a trace.
-
-    A single trace must not contradict the configuration. Of several, each has its own apparatus.
-    """
+    """The configuration with the apparatus of a trace, which a single trace must not contradict."""
     problems, own = [], {}
     for key, value in declared.items():
         table, name = key.split(".")

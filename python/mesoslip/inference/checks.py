@@ -55,7 +55,6 @@ class Agreement:
 
     @property
     def is_rejected(self) -> bool:
-        """Whether the model is rejected."""
         return self.probability < REJECTED
 
     @property
@@ -167,10 +166,8 @@ def _unusual(distance: Array, limit: Array) -> Array:
 
 
 def shrinkage(draws: Array) -> Array:
-    """Shrinkage from prior to posterior by draws on the unit cube, shape (draws, parameters).
-
-    It is 1 - (standard deviation)/(that of the prior), from 0 to 1.
-    """
+    """Shrinkage from prior to posterior, 1 less the ratio of standard deviations, by draws on the
+    unit cube, shape (draws, parameters)."""
     return np.asarray(np.clip(1 - draws.std(axis=0) / PRIOR_DEVIATION, 0, 1))
 
 
@@ -180,11 +177,8 @@ def information(
     summaries: Array,
     observed: Array,
 ) -> dict[str, Array]:
-    """Information of each group of summaries alone on each parameter.
-
-    It is the fraction of the variance of the parameter over simulations near the posterior that the
-    group predicts, 0 to 1.
-    """
+    """Share of the variance of each parameter over simulations near the posterior that each group
+    of summaries predicts."""
     result = {}
     for group in dict.fromkeys(one.group for one in features):
         inside = np.array([one.group == group for one in features])
@@ -198,10 +192,8 @@ def information(
 
 
 def needed_groups(prior: Prior, informed: dict[str, Array]) -> dict[str, tuple[str, ...]]:
-    """The groups of summaries that each parameter follows from, the most informative first.
-
-    ``informed`` is the result of `information`.
-    """
+    """The groups of summaries that each parameter follows from, by the result of `information`, the
+    most informative first."""
     found = {}
     for index, one in enumerate(prior.free):
         parts = {group: float(values[index]) for group, values in informed.items()}
@@ -242,10 +234,8 @@ def warnings(
 def draw_warnings(
     prior: Prior, draws: Array, advice: str = ": widen fit.free.{}.{}"
 ) -> Iterator[str]:
-    """Warnings about parameters by their draws on the unit cube, shape (draws, parameters).
-
-    The advice on a parameter at the end of its range has places for its key and "from" or "to".
-    """
+    """Warnings by draws on the unit cube, shape (draws, parameters); the advice has places for the
+    key and "from" or "to"."""
     shrunk = shrinkage(draws)
     for one, part in zip(prior.free, shrunk, strict=True):
         if part < UNDETERMINED:

@@ -50,8 +50,6 @@ class Prediction:
 
 @dataclass(frozen=True)
 class FitResult:
-    """The result of a fit."""
-
     plan: Plan
     simulator: Simulator
     observed: Array
@@ -150,10 +148,8 @@ def usable_summaries(simulator: Simulator) -> tuple[Array, NDArray[np.bool_]]:
 
 
 def _dominated_by_noise(experiment: Experiment, seed: int) -> NDArray[np.bool_]:
-    """Whether the noise dominates each summary of a trace.
-
-    The noise is doubled: this changes the summary as much as the noise has already changed it.
-    """
+    """Whether doubling the noise, which changes a summary as much as the noise already has, shows
+    that it dominates."""
     summarizer = experiment.summarizer
     observed = summarizer(experiment.force)
     rng = np.random.default_rng([seed, 3])
@@ -167,10 +163,8 @@ def _dominated_by_noise(experiment: Experiment, seed: int) -> NDArray[np.bool_]:
 
 
 def predict_traces(simulations: Simulations, points: Array) -> tuple[Array, tuple[Prediction, ...]]:
-    """Summaries of predicted traces at points of the unit cube, and predictions of each trace.
-
-    The summaries have the shape (traces, summaries).
-    """
+    """Summaries of predicted traces at points of the unit cube, shape (traces, summaries), and
+    predictions of each trace."""
     simulator = simulations.simulator
     experiments = simulator.experiments
     strides = [max(1, len(one.force) // MAX_SAMPLES) for one in experiments]

@@ -54,8 +54,6 @@ MASS_FACTOR = 4.0
 
 @dataclass(frozen=True)
 class Plan:
-    """The plan of a fit."""
-
     config: Config
     """The known parameters; its values of the free keys are not used."""
     prior: Prior
@@ -94,10 +92,8 @@ class Plan:
         overrides: Iterable[Change] = (),
         known: Known | None = None,
     ) -> Plan:
-        """Read a configuration file with a table [fit].
-
-        Known properties of the apparatus according to the traces replace missing keys.
-        """
+        """Read a configuration file with a table [fit], completed by the apparatus of the
+        traces."""
         path, overrides = Path(path), list(overrides)
         merged = read_toml(path)
         tables = override(_nested(merged), overrides).tables
@@ -241,10 +237,8 @@ class Known:
     duration: float
 
     def complete(self, tables: dict[str, Any], free: list[FreeParameter]) -> list[str]:
-        """Add missing keys of the apparatus to a configuration; returns the assumptions.
-
-        A mass that is neither given nor free becomes free, around that of the period of the slips.
-        """
+        """Add missing keys of the apparatus to a configuration, or a free mass around that of the
+        slips' period; returns the assumptions."""
         names = {one.key for one in free}
         drive = tables.setdefault("drive", {})
         slider = tables.setdefault("slider", {})
@@ -371,7 +365,6 @@ class _Reader:
         return value
 
     def free(self, table: object) -> Iterable[FreeParameter]:
-        """The free parameters."""
         if not isinstance(table, Mapping) or not table:
             self.wrong(
                 "fit.free",

@@ -27,11 +27,8 @@ class Instrument:
     """Time constant of the load cell [s], if it is not a parameter; 0 without a filter."""
 
     def levelled(self, config: Config, parameters: Mapping[str, float]) -> Config:
-        """A configuration with the level of this trace, as of more or fewer contacts.
-
-        Forces, stiffness and drag of all contacts are multiplied; their number in the simulation
-        and their breaking stretch stay.
-        """
+        """A configuration with forces, stiffness and drag of all contacts multiplied by the level
+        of this trace."""
         level = parameters.get(self.level, 1.0)
         if level == 1.0 or self.level_of != "contacts":
             return config
@@ -49,10 +46,8 @@ class Instrument:
 
 
 def low_pass(force: Array, step: float) -> Array:
-    """A force behind a low-pass filter of first order, by the interval over its time constant.
-
-    It is exact for a force that is linear between samples, and was constant before the first one.
-    """
+    """A force behind a low-pass filter of first order, exact between samples, by the interval over
+    its time constant."""
     from scipy.signal import lfilter
 
     kept = math.exp(-step)

@@ -102,10 +102,8 @@ def project(summaries: Array, parameters: Array, observed: Array) -> tuple[Proje
 
 
 def _ridge(scores: Array, parameters: Array) -> tuple[Array, Array, Array]:
-    """Weights and offset of a ridge regression, and its predictions of left-out simulations.
-
-    The penalty of each parameter is chosen by leave-one-out validation.
-    """
+    """Weights and offset of a ridge regression, with penalties by leave-one-out validation, and its
+    predictions of left-out simulations."""
     middle, mean = scores.mean(axis=0), parameters.mean(axis=0)
     left, sizes, right = np.linalg.svd(scores - middle, full_matrices=False)
     along = left.T @ (parameters - mean)
@@ -220,10 +218,8 @@ class Surrogate:
         )
 
     def log_likelihood(self, statistics: Array, parameters: Array) -> Array:
-        """Logarithm of the synthetic likelihood of the statistics of a trace, up to a constant.
-
-        The shape is (...,) for parameters of shape (..., parameters).
-        """
+        """Logarithm of the synthetic likelihood up to a constant, shape (...,) for parameters of
+        shape (..., parameters)."""
         deviations, log_determinant = self.standardized(statistics, parameters)
         distance = np.sum(deviations**2, axis=-1)
         size = deviations.shape[-1]
@@ -324,11 +320,8 @@ def _terms(scaled: Array, powers: tuple[tuple[int, ...], ...]) -> Array:
 
 
 def _tails(distance: Array, size: int) -> tuple[float, float]:
-    """Degrees of freedom and width of a multivariate t distribution, by maximum likelihood.
-
-    ``distance`` are squared distances of deviations, of dimension ``size``, from their mean. The
-    degrees of freedom of a normal distribution are infinite.
-    """
+    """Degrees of freedom, infinite for a normal distribution, and width of a multivariate t
+    distribution of dimension ``size``, by squared distances from the mean."""
     from scipy.special import gammaln
 
     square = float(np.mean(distance)) / size

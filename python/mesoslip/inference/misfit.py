@@ -25,11 +25,8 @@ def sentences(
     observed: Array,
     predicted: Array,
 ) -> Iterator[str]:
-    """The largest disagreements with the model, a sentence for each.
-
-    Groups that disagree are in order, the worst first; scores are deviations of the trace from the
-    predictions in spreads.
-    """
+    """The largest disagreements with the model, the worst first; scores are deviations from the
+    predictions in spreads."""
     named = 0
     for group in groups:
         labels: set[str] = set()

@@ -84,11 +84,8 @@ class Noise:
 def cleaned(
     times: Array, force: Array, *, deviation: float | None, is_measured: bool
 ) -> tuple[Array, Noise, tuple[str, ...]]:
-    """A trace without impulses and hum, its other noise, and a sentence for each correction.
-
-    A simulated trace is not corrected, and its noise is white. The standard deviation of white
-    noise may be given [N].
-    """
+    """A measured trace without impulses and hum, its other noise, whose white part may be given
+    [N], and a sentence for each correction."""
     uncertainty = 0.0 if deviation is not None else UNCERTAINTY
     if not is_measured:
         white = noise_level(force) if deviation is None else deviation
@@ -112,10 +109,8 @@ def cleaned(
 
 
 def _differences(force: Array) -> float:
-    """Standard deviation of noise that is not normal, from differences of the trace [N].
-
-    It is estimated as by `noise_level`, but from mean squares of the differences.
-    """
+    """Standard deviation of noise that is not normal [N], as `noise_level` from mean squares of
+    differences."""
     found = []
     for order in ORDERS:
         norm = math.sqrt(math.comb(2 * order, order))

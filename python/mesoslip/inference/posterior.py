@@ -269,10 +269,7 @@ def summaries_group(
     scores: Array,
     left_out: NDArray[np.bool_],
 ) -> Dataset:
-    """The group `SUMMARIES` of traces and of their predictions.
-
-    Predicted summaries have the shape (traces, summaries).
-    """
+    """The group `SUMMARIES` of traces and of their predictions, shape (traces, summaries)."""
     import xarray as xr
 
     low, middle, high = np.full((3, len(features)), np.nan)

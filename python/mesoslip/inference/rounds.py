@@ -211,10 +211,8 @@ def fit_region(
 def _inside(
     parameters: Array, summaries: Array, observed: Array, region: Region | None
 ) -> tuple[NDArray[np.bool_], Array, Array, Region | None]:
-    """Simulations of a region, which is enlarged until enough have the summaries of the trace.
-
-    The results are whether each simulation has these summaries, parameters, summaries, and region.
-    """
+    """Simulations of a region, enlarged until enough have the summaries of the trace: whether each
+    has them, parameters, summaries, region."""
     while True:
         inside = np.full(len(parameters), True) if region is None else region.contains(parameters)
         used = usable(summaries[inside], observed)

@@ -21,10 +21,8 @@ PERIODS = 5
 
 
 def run_in_distance(config: Config, force: float) -> float:
-    """Displacement of the drive in which a simulation forgets its start [m].
-
-    ``force`` is the maximum of the trace [N], up to which the spring is loaded at least.
-    """
+    """Displacement of the drive in which a simulation forgets its start [m]; ``force`` is the
+    maximum of the trace [N]."""
     contacts, stiffness = config.contacts, config.spring_stiffness
     loading = max(contacts.static_force, force) / stiffness if stiffness > 0 else 0.0
     loadings = STEADY_LOADINGS if contacts.initial == "steady" else LOADINGS
@@ -33,10 +31,8 @@ def run_in_distance(config: Config, force: float) -> float:
 
 
 def run_in_samples(config: Config, force: float, interval: float, count: int) -> int:
-    """That distance in samples of an interval [s], and at least some periods of the setup.
-
-    It is at most as long as the trace.
-    """
+    """That distance in samples of an interval [s], with some periods of the setup, at most that of
+    the trace."""
     velocity = abs(first_velocity(config) or 0.0)
     if not velocity > 0:
         return count

@@ -61,10 +61,8 @@ class Simulator:
         return np.concatenate([one.summarizer(one.force) for one in self.experiments])
 
     def forces(self, piece: Piece, stop: StopRequest) -> list[Array] | None:
-        """Noisy traces of the force [N], one an experiment; None if they cannot be simulated.
-
-        The number of the simulation determines its random numbers.
-        """
+        """Noisy traces of the force [N] by the number of the simulation, one an experiment; None if
+        they cannot be simulated."""
         number, unit, is_coarse = piece
         values = self.prior.values(unit)
         changes, nuisances = self.prior.changes(values), self.prior.nuisances(values)
@@ -167,11 +165,8 @@ class Simulations:
         return len(self._parameters)
 
     def add(self, points: Array, *, exact: bool = False) -> None:
-        """Simulate at points of the unit cube, shape (points, parameters).
-
-        If ``exact``, the simulations have all contacts. A stopped fit keeps finished simulations in
-        its store.
-        """
+        """Simulate at points of the unit cube, shape (points, parameters), with all contacts if
+        ``exact``; a stop keeps finished ones."""
         start, is_coarse = len(self), self.has_coarse and not exact
         found = {}
         for number, point in enumerate(points, start):
@@ -194,10 +189,7 @@ class Simulations:
         self._is_coarse += [is_coarse] * len(points)
 
     def forces(self, points: Array) -> Iterator[list[Array]]:
-        """Noisy traces at points of the unit cube, with all contacts.
-
-        The numbers of these simulations are beyond all others.
-        """
+        """Noisy traces at points of the unit cube with all contacts, numbered beyond all others."""
         first = self._expected + len(self)
         pieces = [(number, point, False) for number, point in enumerate(points, first)]
         work = self._completed(self.simulator.forces, pieces, in_order=True)

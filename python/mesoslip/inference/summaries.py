@@ -96,11 +96,9 @@ class Summarizer:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the summaries."""
         return tuple(one.name for one in self.features)
 
     def slips(self, force: Array) -> FoundSlips:
-        """The slips of a trace."""
         return find_slips_between_reversals(
             self.pieces,
             self.time,
@@ -111,10 +109,7 @@ class Summarizer:
         )
 
     def __call__(self, force: Array, found: FoundSlips | None = None) -> Array:
-        """The summaries of a trace of the force [N], shape (samples,); NaN if undefined.
-
-        Its slips may be given, if they are known.
-        """
+        """The summaries of a trace of the force [N], whose slips may be given; NaN if undefined."""
         found = self.slips(force) if found is None else found
         force = self.direction * force / self.scale
         values: dict[str, float] = {"slip_count": math.log(len(found) + 0.5)}

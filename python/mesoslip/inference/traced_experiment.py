@@ -139,11 +139,8 @@ class Experiment:
         words: Words,
         stop: StopRequest,
     ) -> Array | None:
-        """A noisy trace of the force [N], as `force`; None if it cannot be simulated.
-
-        ``changes`` are values of the free keys, ``nuisances`` of other parameters, and three
-        ``words`` determine the random numbers.
-        """
+        """A noisy trace of the force [N] as `force`, by values of free keys, ``nuisances``, and
+        three ``words`` for the random numbers."""
         count = self.sampling.simulated_count
         try:
             own = self.apparatus.values(changes)

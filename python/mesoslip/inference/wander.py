@@ -44,11 +44,8 @@ def wandering(
 
 
 def measured_length(summarizer: Summarizer, force: Array, velocity: float) -> float:
-    """Correlation length of the slow variation of a measured force [m].
-
-    It is that of a normal curve that falls to one half at the same distance as the correlation of
-    the force, averaged over some slips.
-    """
+    """Correlation length of the slow variation of a force [m]: that of the normal curve with the
+    same distance of half correlation."""
     from scipy.ndimage import uniform_filter1d
 
     time = summarizer.time

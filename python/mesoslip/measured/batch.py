@@ -70,7 +70,6 @@ def pieces_of(
 
 
 def output_name(file: Path) -> str:
-    """Name of the output of a file."""
     return f"{Path(file.stem).stem if file.suffix in PACKED else file.stem}.nc"
 
 
@@ -81,10 +80,8 @@ def read_pieces(
     executor: ExecutorLike = None,
     progress: Callable[[float], None] = lambda _: None,
 ) -> list[Row]:
-    """Read files and write their outputs; the rows of those that were read before a stop.
-
-    A file that cannot be read has a row with the message.
-    """
+    """Read files and write their outputs; the rows of those before a stop, of a file that cannot be
+    read with the message."""
     pool = as_executor(executor, ThreadsThenProcesses)
     rows = []
     with closing(completed(pool, read_piece, pieces, stop, in_order=True)) as done:

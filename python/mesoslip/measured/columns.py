@@ -87,10 +87,8 @@ class Assignment:
 
 
 def assign(table: Table, columns: Columns, headers: str | None) -> Assignment:
-    """Find the quantity of each column, from its description, or else from its header.
-
-    ``headers`` replace those of the file.
-    """
+    """Find the quantity of each column, from its description, or else from its header; ``headers``
+    replace those of the file."""
     given = None if headers is None else _given(table, headers)
     found = Assignment()
     problems = []

@@ -157,10 +157,8 @@ class Columns(Table):
 
 
 class TraceDescription(Table):
-    """Properties of a measurement that its file does not contain.
-
-    Quantities are strings with units, as they were written; `si` has them in SI.
-    """
+    """Properties of a measurement that its file does not contain, as they were written; `si` has
+    them in SI."""
 
     file: Text | Annotated[list[Text], Field(min_length=1)]
     """The file of the measurement, relative to the file of this table; or a list of the parts of a
@@ -265,11 +263,8 @@ OTHER_TABLES = ("fit", "trace")
 def describe(
     files: Sequence[Path], options: Mapping[str, Any]
 ) -> tuple[Experiment, list[Path], Config | None]:
-    """The description of a measurement, its files, and the configuration of a model, if any.
-
-    The files are those of the parts of the measurement, or a TOML file with a table [trace], whose
-    keys the options replace.
-    """
+    """The description of a measurement, its files, and the configuration of a model, if any, from
+    options and the table [trace] of a TOML file."""
     file = files[0]
     changes = {name: value for name, value in options.items() if value is not None}
     toml = next((one for one in files if one.suffix.lower() == ".toml"), None)

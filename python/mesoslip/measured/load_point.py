@@ -58,10 +58,8 @@ MIN_DEVIATION = 1e-15
 
 @dataclass(frozen=True)
 class DriveStage:
-    """A stage of the drive: times [s] and velocities of the load point [m/s].
-
-    The velocities are equal except in a ramp, and 0 in a hold.
-    """
+    """A stage of the drive: times [s] and velocities of the load point [m/s], equal except in a
+    ramp."""
 
     start: float
     end: float
@@ -171,11 +169,8 @@ def _digital_step(values: Array) -> float:
 
 
 def _inflated(points: _Points) -> _Points:
-    """Points with a variance that includes the correlation of the noise from one to the next.
-
-    Lines and parabolas do not contribute to third differences, and the few changes hardly to their
-    median.
-    """
+    """Points with a variance that includes the correlation of neighbours, by the median of third
+    differences."""
     factor = 1.0
     for lag in LAGS:
         count = points.time.size - 3 * lag
@@ -195,11 +190,8 @@ def _inflated(points: _Points) -> _Points:
 
 
 def _even_edges(values: Array, count: int) -> Integers:
-    """First samples of means, and the end.
-
-    These are at most ``count`` means of equal numbers of samples. Means with more than their share
-    of the path are divided, so that a short stage has some too.
-    """
+    """First samples, and the end, of at most ``count`` means of equal numbers of samples, divided
+    where the path is long."""
     size = values.size
     edges = np.unique(np.linspace(0, size, min(size, count) + 1).astype(np.int64))
     means = np.add.reduceat(values, edges[:-1]) / np.diff(edges)
@@ -372,10 +364,8 @@ def _merged(points: _Points, pieces: list[_Piece]) -> list[_Piece]:
 
 
 def _without_excursion(points: _Points, pieces: list[_Piece], top: float) -> list[_Piece] | None:
-    """Pieces without the first short excursion from a constant velocity; None without excursions.
-
-    After an excursion, the displacement continues as if there had been none.
-    """
+    """Pieces without the first short excursion from a constant velocity, continued without it; None
+    without excursions."""
     time = points.time
     for first in range(len(pieces) - 2):
         for last in range(first + 2, min(first + 2 + MAX_EXCURSION, len(pieces))):

@@ -17,10 +17,8 @@ from mesoslip.output import variables
 def slip_group(
     found: FoundSlips, velocity: float | None, stiffness: float | None, unit: str
 ) -> Dataset:
-    """The catalogue of slips, with peak velocities if drive and stiffness are known.
-
-    The unit is that of the force, "N" or "1", here and in the other groups.
-    """
+    """The catalogue of slips in the unit of the force, "N" or "1", with peak velocities if drive
+    and stiffness are known."""
     speed = np.full(len(found), np.nan)
     if stiffness is not None and 0 < stiffness < math.inf and velocity is not None:
         speed = found.fall_rate / stiffness + abs(velocity)

@@ -40,10 +40,8 @@ def joined(tables: Sequence[Table]) -> Table:
 
 
 def continued(time: Array, tables: Sequence[Table]) -> tuple[Array, list[str]]:
-    """Times of all rows of parts, and notes on parts whose clock starts again.
-
-    Their times follow the end of the part before by a usual interval.
-    """
+    """Times of all rows of parts that follow each other by a usual interval, and notes on clocks
+    that start again."""
     time, notes, start = time.copy() if len(tables) > 1 else time, [], 0
     for before, table in pairwise(tables):
         start += before.values.shape[1]

@@ -108,11 +108,8 @@ def _without_repeated(
     notes: list[str],
     row: str,
 ) -> Numbers:
-    """Leave out rows that repeat earlier ones in time and values.
-
-    Of a block that goes back in time, most rows do: after a clock that starts again, some are equal
-    to earlier ones by chance.
-    """
+    """Leave out rows that repeat earlier ones in time and values, if most of a block that goes back
+    in time do."""
     every = np.ascontiguousarray(np.vstack([time, *values])[:, rows].T) + 0.0
     # Missing numbers are equal to each other.
     every[np.isnan(every)] = np.inf

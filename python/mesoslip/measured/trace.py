@@ -257,32 +257,9 @@ def read_trace(
     >>> tree["spring_force"].dims, tree["slips"].sizes["slip"] > 3
     (('realization', 'time'), True)
     """
-    return trace_of(
-        understand(
-            file,
-            config=config,
-            headers=columns,
-            decimal=decimal,
-            sheet=sheet,
-            rate=rate,
-            velocity=velocity,
-            stiffness=stiffness,
-            radius=radius,
-            viscosity=viscosity,
-            motion=motion,
-            normal_force=normal_force,
-            normal_stress=normal_stress,
-            area=area,
-            start=start,
-            end=end,
-            hum=hum,
-            trend=trend,
-            noise=noise,
-            period=period,
-            part=part,
-            min_fall=min_fall,
-        )
-    )
+    options = {name: value for name, value in locals().items() if name != "file"}
+    options["headers"] = options.pop("columns")
+    return trace_of(understand(file, **options))
 
 
 def trace_of(understood: Understood) -> DataTree:

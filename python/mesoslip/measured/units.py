@@ -125,10 +125,8 @@ def is_unit(text: str) -> bool:
 
 @cache
 def size_of(text: str, unit: str) -> Size | None:
-    """Size of a unit in an SI unit, or in volts; None if it is of another dimension.
-
-    A ValueError if the text is not a unit.
-    """
+    """Size of a unit in an SI unit, or in volts; None for another dimension, a ValueError for no
+    unit."""
     name = unit_named(text)
     if name is None:
         # Rare units, such as furlongs, are known to pint.

@@ -36,10 +36,8 @@ def group_of(tree: Tree, name: str) -> Dataset | Arrays: ...
 
 
 def group_of(tree: Tree, name: str) -> Dataset | Arrays:
-    """A group of an output, without the coordinates of the root that it does not use.
-
-    With them, `xarray.Dataset.to_dataframe` would repeat each row for every time of the trace.
-    """
+    """A group of an output, without the coordinates of the root, which would repeat its rows in a
+    table."""
     if isinstance(tree, Arrays):
         return tree.children[name]
     data = tree.children[name].to_dataset()

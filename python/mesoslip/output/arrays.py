@@ -78,10 +78,8 @@ class Values:
 
 @dataclass(frozen=True)
 class Stored:
-    """A variable in a file, or a part of it, whose values are read when needed; see `Variable`.
-
-    ``part`` has the indices by dimension.
-    """
+    """A variable in a file, or the part with the indices ``part``, whose values are read when
+    needed; see `Variable`."""
 
     stored: netCDF4.Variable[Any]
     attrs: Mapping[str, Any]

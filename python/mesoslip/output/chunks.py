@@ -76,10 +76,8 @@ class _Piece:
 
 
 def write_chunks(path: Path, blocks: Iterable[Block], threads: int) -> None:
-    """Write blocks to the variables of a netCDF-4 file, arranged and compressed on threads.
-
-    Chunks of variables must be those of blocks, and shuffled if compressed.
-    """
+    """Write blocks, which are chunks of variables of a netCDF-4 file, arranged and compressed on
+    threads."""
     with _Storage(path, "r+") as storage:
         with h5py.File(storage, "r+") as file:
             for pieces in _in_order(_with_targets(blocks, file), threads):
@@ -92,10 +90,8 @@ def write_chunks(path: Path, blocks: Iterable[Block], threads: int) -> None:
 
 
 class _Storage(FileIO):
-    """A file that hides failed writes from HDF5's library, which would crash as it closes the file.
-
-    After the first ``error`` nothing is written.
-    """
+    """A file that hides failed writes from HDF5's library, which would crash as it closes the file;
+    the first ``error`` is the last write."""
 
     error: OSError | None = None
 

@@ -41,10 +41,8 @@ DAMAGES = (
 
 @contextmanager
 def opened(path: str | Path) -> Iterator[DataTree]:
-    """An output of any command; data are read when needed.
-
-    Raises a `FileError` if it is not an output, is damaged, or refers to other files.
-    """
+    """An output of any command, read when needed; a `FileError` if it is not one, is damaged, or
+    refers to other files."""
     with _opened(path, _tree) as tree:
         yield tree
 

@@ -58,10 +58,8 @@ def _check_heap(data: bytes, start: int) -> None:
 
 
 def check_links(path: Path) -> None:
-    """Refuse a file with soft or external links, data in other files, or two names of one object.
-
-    Links are not followed: they may lead to files of others, or to one without end.
-    """
+    """Refuse soft and external links, which may lead to files of others or to one without end, data
+    in other files, and two names of one object."""
     import h5py
 
     with path.open("rb") as source:

@@ -129,10 +129,8 @@ def opened(
     stack: ExitStack,
     is_enough: Callable[[Arrays], bool] = lambda _: False,
 ) -> tuple[list[DataTree], list[str]]:
-    """Outputs of any command, read when needed, and their names; the stack closes files.
-
-    Files are read as `Arrays` if that is enough.
-    """
+    """Outputs of any command, as `Arrays` if that is enough, and their names; the stack closes
+    files."""
     from mesoslip.output import files
 
     trees, names = [], []

@@ -1,8 +1,4 @@
-"""Kinds of outputs, one for each command.
-
-A new kind needs a line here, a default view of the same name in `mesoslip.plots.views`, and its
-sections in `mesoslip.reports.sections`.
-"""
+"""Kinds of outputs, one for each command."""
 
 from __future__ import annotations
 

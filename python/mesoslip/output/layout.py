@@ -101,7 +101,6 @@ class GroupLayout:
 
 
 def column(table: str, name: str) -> Pick:
-    """A column of a table."""
     number = tables.COLUMNS[table].index(name)
     return lambda rows, _: rows[:, number]
 

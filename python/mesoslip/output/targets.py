@@ -127,10 +127,8 @@ def _not_written(path: Path, target: Path, error: Exception) -> FileError:
 
 
 class PrivateFolder(NamedTuple):
-    """A folder by its descriptor, and the folder in which it is.
-
-    Its path stays that of this folder if others rename it, as they can if its parent is theirs.
-    """
+    """A folder by its descriptor, with the folder in which it is; its path stays if others rename
+    it."""
 
     number: int
     parent: int
@@ -214,10 +212,7 @@ def _remove_left_behind(parent: Path) -> None:
 
 @contextmanager
 def written_whole(path: Path, *, is_output: bool = False) -> Iterator[Path]:
-    """A file of the same name that replaces a file when it is complete.
-
-    Files that may not be replaced are refused, as by `check_output` or `check_writable`.
-    """
+    """A file that replaces that of the same name when it is complete, if that may be replaced."""
     target = _target(path, is_output=is_output)
     try:
         target.parent.mkdir(parents=True, exist_ok=True)

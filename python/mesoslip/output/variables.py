@@ -31,7 +31,6 @@ class Meaning:
 
     @property
     def attributes(self) -> dict[str, Any]:
-        """Attributes of the variable."""
         found: dict[str, Any] = {"units": self.units, "long_name": self.long_name, **self.further}
         if "flag_meanings" in self.further:
             count = len(self.further["flag_meanings"].split())
@@ -98,7 +97,6 @@ class Group(dict[str, Meaning]):
 
     @property
     def empty_row(self) -> dict[str, Any]:
-        """A row without values."""
         return {
             name: math.nan if one.dtype is np.float64 else "" if one.dtype is np.str_ else 0
             for name, one in self.items()

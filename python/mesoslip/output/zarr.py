@@ -15,10 +15,7 @@ MARK = ".zgroup"
 
 
 def write_zarr(tree: DataTree, path: Path) -> None:
-    """Write an output as a Zarr store, a folder that appears when it is whole.
-
-    It replaces an earlier store. ``xarray.open_datatree(path, engine="zarr")`` reads it.
-    """
+    """Write an output as a Zarr store, which replaces an earlier one when it is whole."""
     try:
         import zarr  # noqa: F401
     except ImportError:

@@ -7,10 +7,8 @@ RC_FILE = "matplotlibrc"
 
 
 def _load_matplotlib() -> None:
-    """Load matplotlib without the file matplotlibrc of the current folder, which may be anyone's.
-
-    It is the first place where matplotlib looks, and a wrong file there ends the import.
-    """
+    """Load matplotlib without the file matplotlibrc of the current folder, which may be anyone's
+    and wrong."""
     exists = os.path.exists
 
     def exists_elsewhere(path: Any) -> bool:

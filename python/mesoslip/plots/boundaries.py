@@ -91,10 +91,8 @@ def boundary_measures(names: list[str]) -> set[str]:
 
 
 def draw_contours(axes: Axes, data: Dataset, choice: str, keys: list[SweptKey]) -> list[Line2D]:
-    """Draw the boundaries that the map of a choice crosses; returns lines for a legend.
-
-    A line crosses the edges between neighbours of different signs once, and no others.
-    """
+    """Draw the boundaries that the map of a choice crosses, each edge between different signs once;
+    returns lines for a legend."""
     drawn = []
     for one in _boundaries(data, choice):
         lines = _lines(one, one.excess(data, keys), keys)

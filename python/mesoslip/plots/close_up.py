@@ -48,10 +48,8 @@ def draw_slip(
     extent: Extent = EVERYTHING,
     title: str = "largest slip",
 ) -> None:
-    """Draw the forces during a slip, and each of some variables of the trace in a panel below.
-
-    The realization and the number of intervals are those of the extent.
-    """
+    """Draw the forces during a slip, and some variables of the trace in panels below, by the
+    extent."""
     times = times_of(tree)
     low, high = slip_window(slip)
     near = Extent(extent.first, max(low, times[0]), min(high, times[-1]), parts=extent.parts)
@@ -100,7 +98,6 @@ class Sampling(NamedTuple):
 
     @classmethod
     def of(cls, tree: Tree, slip: Slip, realization: int) -> Sampling:
-        """The sampling of a slip."""
         start, end = slip["start_time"], slip["end_time"]
         parts = [one.inside((start, end)) for one in samples(tree, realization)]
         count = sum(after - first for first, after in parts)

@@ -49,10 +49,8 @@ def draw_curves(
     horizontal: HorizontalAxis,
     label: str | None = None,
 ) -> None:
-    """Draw curves that have the unit of a variable, with the prefix that suits them.
-
-    The label of their axis is the name of the variable by default.
-    """
+    """Draw curves in the unit of a variable with a suitable prefix, on an axis with its name or
+    another label."""
     largest = max_size(*(one.y for one in curves))
     scale = scale_for(largest, UNITS[name])
     for x, y, style in curves:

@@ -124,11 +124,8 @@ def draw(
     figure: Canvas | None = None,
     axes: Axes | None = None,
 ) -> Canvas:
-    """Draw a view of outputs of any command into a figure, or its most informative panel into axes.
-
-    Several outputs are drawn over each other; names are for those that do not differ. The name of a
-    view may be a measure of a sweep.
-    """
+    """Draw a view of outputs, or a measure of a sweep, into a figure, or its most informative panel
+    into axes; several over each other."""
     chosen = picture(trees, names, view, options)
     if axes is None:
         return chosen.whole(figure)

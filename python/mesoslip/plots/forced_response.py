@@ -55,8 +55,7 @@ def _draw_displacement(axes: Axes, tree: Tree, experiment: Experiment) -> None:
     # From no force on, so that the size of steps is seen.
     low, high = min(0.0, force.get_ylim()[0]), max(0.0, force.get_ylim()[1])
     force.set_ylim(1.1 * low, 1.1 * high)
-    axes.set_xlabel(time.label("time"))
-    axes.set_ylabel(length.label("displacement"))
+    axes.set(xlabel=time.label("time"), ylabel=length.label("displacement"))
     titles(axes, tree)
 
 
@@ -82,8 +81,7 @@ def _draw_creep(axes: Axes, experiment: Experiment, data: Arrays) -> None:
         scale = 1 / experiment.static_force
         slope = with_error(line.slope * scale, line.slope_error * scale)
         write_title(axes, f"$dF/d\\ln v$ = {slope} $F_s$")
-    axes.set_xlabel(unit.label("velocity of creep"))
-    axes.set_ylabel("force over $F_s$")
+    axes.set(xlabel=unit.label("velocity of creep"), ylabel="force over $F_s$")
 
 
 def _creep_forces(config: Config, velocity: Array) -> Array | None:
@@ -109,5 +107,4 @@ def _draw_friction(axes: Axes, experiment: Experiment, data: Arrays) -> None:
         axes.plot(ends / unit.size, (line.level + line.slope * np.log(ends)) * scale, color=RED)
         slope = with_error(line.slope * scale, line.slope_error * scale)
         write_title(axes, f"slope over ln of the rate = {slope} $F_s$")
-    axes.set_xlabel(unit.label("rate of the force"))
-    axes.set_ylabel("static friction over $F_s$")
+    axes.set(xlabel=unit.label("rate of the force"), ylabel="static friction over $F_s$")

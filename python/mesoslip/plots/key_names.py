@@ -86,11 +86,8 @@ def setting(key: str, value: str, config: Config, *, is_alone: bool) -> str:
 
 
 def changes_in_a_line(config: Config, base: Config, room: int) -> str:
-    """The changes of a configuration from its base that fit into a number of characters.
-
-    Lists, and the length and the record of a run, are left out; and all, if they do not fit but the
-    configuration has a title of its own.
-    """
+    """The changes of a configuration, without lists and lengths, that fit into a number of
+    characters; none of them beside an own title if not all fit."""
     found = [
         one
         for one in changes(config, base)

@@ -20,10 +20,8 @@ MAX_MARKS = 2000
 def draw_marks(
     axes: Axes, tree: Tree, name: str, extent: Extent, horizontal: HorizontalAxis
 ) -> bool:
-    """Mark starts and ends of slips, and impulses, on the force of a measured trace.
-
-    Returns whether anything is marked.
-    """
+    """Mark starts and ends of slips, and impulses, on the force of a measured trace; whether
+    anything is marked."""
     root = tree.to_dataset()
     time, force = root["time"].values, root[name].values[0]
     window = extent.window(tree)

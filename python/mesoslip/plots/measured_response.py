@@ -78,8 +78,7 @@ def _draw_residuals(axes: Axes, experiment: Experiment, found: Fit, scale: Scale
     x = _horizontal(experiment, found) / scale.size
     axes.plot(x, found.residual / deviation, ".", color="black", markersize=2)
     axes.axhline(0, color=RED)
-    axes.set_ylabel("residual over noise")
-    axes.set_xlabel(scale.label("displacement of the load point"))
+    axes.set(ylabel="residual over noise", xlabel=scale.label("displacement of the load point"))
 
 
 def _draw_rates(axes: Axes, response: Arrays, unit: Scale) -> None:
@@ -109,8 +108,7 @@ def _draw_rates(axes: Axes, response: Arrays, unit: Scale) -> None:
     axes.axhline(0, color="0.7", zorder=0)
     logarithmic(axes, "x")
     axes.set_xlim(velocity.min() / scale.size / MARGIN, velocity.max() / scale.size * MARGIN)
-    axes.set_xlabel(scale.label("velocity after the step"))
-    axes.set_ylabel(f"$a - b$ ({unit.name})")
+    axes.set(xlabel=scale.label("velocity after the step"), ylabel=f"$a - b$ ({unit.name})")
 
 
 def _key(row: dict[str, float]) -> str:
@@ -124,8 +122,7 @@ def _draw_healing(axes: Axes, response: Arrays, unit: Scale) -> None:
     error = np.nan_to_num(holds[f"{name}_error"].values) / unit.size
     axes.errorbar(holds["hold_time"].values, holds[name].values / unit.size, error, **POINTS)
     logarithmic(axes, "x")
-    axes.set_xlabel("hold time (s)")
-    axes.set_ylabel(f"healing ({unit.name})")
+    axes.set(xlabel="hold time (s)", ylabel=f"healing ({unit.name})")
 
 
 def draw_measured(tree: Tree, experiment: Experiment, figure: Canvas | None) -> Canvas:

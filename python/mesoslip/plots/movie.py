@@ -71,10 +71,8 @@ SIMPLE = (Line2D, Patch, Text, Collection)
 
 
 class _FrameCanvas(FigureCanvasAgg):
-    """Draws what changes from frame to frame, such as lines, texts and colours, over a background.
-
-    If anything else changes, such as the limits of an axis, it draws the whole figure.
-    """
+    """Draws changed lines, texts and colours over a background, and the whole figure if anything
+    else changes."""
 
     def __init__(self, figure: Figure) -> None:
         super().__init__(figure)
@@ -127,10 +125,8 @@ class _FrameCanvas(FigureCanvasAgg):
 
 
 def chosen_frames(times: Array, activity: Array, count: int = MAX_FRAMES) -> NDArray[np.intp]:
-    """Indices of samples that become frames, many where there is much motion.
-
-    The motion between samples at times of shape (T) has shape (T - 1) and any unit.
-    """
+    """Indices of samples that become frames, by the motion between samples, shape (T - 1), at times
+    of shape (T)."""
     if times.size <= count:
         return np.arange(times.size)
     moved = np.append(0.0, np.cumsum(activity))

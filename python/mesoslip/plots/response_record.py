@@ -57,8 +57,7 @@ def draw_record(axes: Axes, experiment: Experiment, scale: Scale) -> None:
         later = force[experiment.samples(steady).start + mean.start :]
         margin = 0.15 * max(float(np.ptp(later)), 1e-3)
         axes.set_ylim(later.min() - 2 * margin, later.max() + margin)
-    axes.set_xlabel(scale.label("displacement of the load point"))
-    axes.set_ylabel(unit.name)
+    axes.set(xlabel=scale.label("displacement of the load point"), ylabel=unit.name)
     for stage in experiment.stages[1 : MAX_MARKS + 1]:
         start = x[experiment.start_sample(stage)] / scale.size
         axes.axvline(start, color=BLUE if stage.is_hold else "0.8", linewidth=0.5, zorder=0)
@@ -72,10 +71,8 @@ def fit_label(axes: Axes, parts: Sequence[str]) -> str:
 
 
 def title_record(axes: Axes, tree: Tree, about: str = "") -> None:
-    """Write the title of an output, and a line about its stages, above the labels of the stages.
-
-    The legend goes between title and labels, where it hides no data.
-    """
+    """Write the title of an output, a legend, and a line about its stages, above the labels of the
+    stages."""
     titles(axes, tree, about)
     labels = axes.get_legend_handles_labels()[1]
     lines = sum(label.count("\n") + 1 for label in labels)

@@ -184,10 +184,8 @@ _LOCK = threading.RLock()
 
 @contextmanager
 def styled() -> Iterator[None]:
-    """Draw in the style of mesoslip, one thread at a time, and restore the style of the session.
-
-    Matplotlib has one style for the whole process.
-    """
+    """Draw in the style of mesoslip, one thread at a time, and restore matplotlib's one style of
+    the session."""
     with _LOCK, mpl.rc_context(current().settings):
         yield
 

@@ -35,10 +35,8 @@ MAX_LABELS = 8
 
 @dataclass(frozen=True)
 class SweptKey:
-    """An axis of a swept key: its label, and its values in the unit of the label.
-
-    The values of a key of words are 0, 1, 2, ...; that of numbers has no words.
-    """
+    """An axis of a swept key: its label, and its values in the unit of the label, 0, 1, 2, ... for
+    words."""
 
     label: str
     values: Array

@@ -72,10 +72,8 @@ def measured(data: Dataset, name: str, label: str, unit: float) -> Measured:
 
 
 def draw_line(axes: Axes, one: Measured, key: SweptKey, *, is_line: bool) -> list[Line2D]:
-    """Draw a measure over one key: realizations, and their mean with its standard error.
-
-    Points without cycles are open. Returns lines for a legend.
-    """
+    """Draw realizations of a measure over one key, open without cycles, and their mean; returns
+    lines for a legend."""
     axes.set_ylabel(one.label)
     if one.choices:
         _draw_choices(axes, one, key)
@@ -119,10 +117,8 @@ def _name_rows(axes: Axes, one: Measured) -> None:
 
 
 def draw_directions(axes: Axes, data: Dataset, one: Measured, key: SweptKey) -> list[Line2D]:
-    """Draw a measure up and down one key; returns lines for a legend.
-
-    The directions are the dimension before that of the realizations.
-    """
+    """Draw a measure up and down one key, the dimension before the realizations; returns lines for
+    a legend."""
     axes.set_ylabel(one.label)
     rows = {code: row for row, code in enumerate(one.rows)}
     lines = []
@@ -150,10 +146,8 @@ def draw_directions(axes: Axes, data: Dataset, one: Measured, key: SweptKey) -> 
 def draw_map(
     axes: Axes, one: Measured, keys: list[SweptKey], norm: Normalize | None = None
 ) -> list[Line2D]:
-    """Draw a measure over two keys, with the colours of a norm, by default its own.
-
-    Points without cycles are grey, with a mark. Returns marks for a legend.
-    """
+    """Draw a measure over two keys by a norm, points without cycles in grey; returns marks for a
+    legend."""
     order = np.ix_(*(key.order for key in keys))
     shown = one.shown[order].T
     edges = keys[0].edges, keys[1].edges

@@ -88,8 +88,6 @@ Block = Text | Table | Picture | Source
 
 @dataclass(frozen=True)
 class Section:
-    """A section of a report."""
-
     title: str
     blocks: tuple[Block, ...] = field(default=())
 

@@ -396,7 +396,6 @@ def _interaction(lattice: Interaction, key: str, config: Config) -> str:  # noqa
 
 @singledispatch
 def slider_sentence(slider: SliderTable) -> str:
-    """A sentence on a slider."""
     raise TypeError(f"there is no sentence on a slider of kind {slider.kind}")
 
 

@@ -6,6 +6,8 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from mesoslip.text_rows import rows_of_text
+
 # A citation in a text, as in Markdown of Pandoc: [@braun2009; @braun2011].
 CITATION = re.compile(r"\[@([^\]]+)\]")
 # Key of the program itself; its version and year are those of an output.
@@ -44,23 +46,45 @@ class Reference:
         return f"@{self.kind}{{{key},\n{inner}\n}}"
 
 
-def _article(
-    author: str, title: str, journal: str, volume: str, pages: str, **more: str
-) -> Reference:
-    where = {"journal": journal, "volume": volume, "pages": pages}
-    return Reference("article", {"author": author, "title": title, **where, **more})
-
-
+# Key, author, title, journal, volume, pages, year and DOI. Indented lines continue the row above.
+ARTICLES = """
+braun2009 | Braun, O. M. and Tosatti, E.
+    | Kinetics of stick-slip friction in boundary lubrication
+    | Europhysics Letters | 88 | 48003 | 2009 | 10.1209/0295-5075/88/48003
+braun2011 | Braun, O. M. and Tosatti, E.
+    | Kinetics and dynamics of frictional stick-slip in mesoscopic boundary lubrication
+    | Philosophical Magazine | 91 | 3253--3275 | 2011
+braun2011temperature | Braun, O. M. and Peyrard, M.
+    | Dependence of kinetic friction on velocity: Master equation approach
+    | Physical Review E | 83 | 046129 | 2011 | 10.1103/PhysRevE.83.046129
+braun2015 | Braun, O. M.
+    | Stick-slip vs. smooth sliding in the multicontact interface
+    | Europhysics Letters | 109 | 48004 | 2015
+barel2010 | Barel, I. and Urbakh, M. and Jansen, L. and Schirmeisen, A.
+    | Multibond dynamics of nanoscale friction: the role of temperature
+    | Physical Review Letters | 104 | 066104 | 2010 | 10.1103/PhysRevLett.104.066104
+hindmarsh2005 | Hindmarsh, A. C. and others
+    | SUNDIALS: Suite of nonlinear and differential/algebraic equation solvers
+    | ACM Transactions on Mathematical Software | 31 | 363--396 | 2005 | 10.1145/1089014.1089020
+wood2010 | Wood, S. N.
+    | Statistical inference for noisy nonlinear ecological dynamic systems
+    | Nature | 466 | 1102--1104 | 2010 | 10.1038/nature09319
+dieterich1979 | Dieterich, J. H.
+    | Modeling of rock friction: 1. Experimental results and constitutive equations
+    | Journal of Geophysical Research | 84 | 2161--2168 | 1979 | 10.1029/JB084iB05p02161
+ruina1983 | Ruina, A.
+    | Slip instability and state variable friction laws
+    | Journal of Geophysical Research | 88 | 10359--10370 | 1983 | 10.1029/JB088iB12p10359
+foreman2013 | Foreman-Mackey, D. and Hogg, D. W. and Lang, D. and Goodman, J.
+    | emcee: The MCMC hammer
+    | Publications of the Astronomical Society of the Pacific | 125 | 306--312 | 2013
+    | 10.1086/670067
+"""
+FIELDS = ("author", "title", "journal", "volume", "pages", "year", "doi")
 REFERENCES = {
-    "braun2009": _article(
-        "Braun, O. M. and Tosatti, E.",
-        "Kinetics of stick-slip friction in boundary lubrication",
-        "Europhysics Letters",
-        "88",
-        "48003",
-        year="2009",
-        doi="10.1209/0295-5075/88/48003",
-    ),
+    key: Reference("article", dict(zip(FIELDS, cells, strict=False)))
+    for key, *cells in rows_of_text(ARTICLES)
+} | {
     "braun2010": Reference(
         "misc",
         {
@@ -69,86 +93,7 @@ REFERENCES = {
             "year": "2010",
             "url": "https://arxiv.org/abs/1009.2856",
         },
-    ),
-    "braun2011": _article(
-        "Braun, O. M. and Tosatti, E.",
-        "Kinetics and dynamics of frictional stick-slip in mesoscopic boundary lubrication",
-        "Philosophical Magazine",
-        "91",
-        "3253--3275",
-        year="2011",
-    ),
-    "braun2011temperature": _article(
-        "Braun, O. M. and Peyrard, M.",
-        "Dependence of kinetic friction on velocity: Master equation approach",
-        "Physical Review E",
-        "83",
-        "046129",
-        year="2011",
-        doi="10.1103/PhysRevE.83.046129",
-    ),
-    "braun2015": _article(
-        "Braun, O. M.",
-        "Stick-slip vs. smooth sliding in the multicontact interface",
-        "Europhysics Letters",
-        "109",
-        "48004",
-        year="2015",
-    ),
-    "barel2010": _article(
-        "Barel, I. and Urbakh, M. and Jansen, L. and Schirmeisen, A.",
-        "Multibond dynamics of nanoscale friction: the role of temperature",
-        "Physical Review Letters",
-        "104",
-        "066104",
-        year="2010",
-        doi="10.1103/PhysRevLett.104.066104",
-    ),
-    "hindmarsh2005": _article(
-        "Hindmarsh, A. C. and others",
-        "SUNDIALS: Suite of nonlinear and differential/algebraic equation solvers",
-        "ACM Transactions on Mathematical Software",
-        "31",
-        "363--396",
-        year="2005",
-        doi="10.1145/1089014.1089020",
-    ),
-    "wood2010": _article(
-        "Wood, S. N.",
-        "Statistical inference for noisy nonlinear ecological dynamic systems",
-        "Nature",
-        "466",
-        "1102--1104",
-        year="2010",
-        doi="10.1038/nature09319",
-    ),
-    "dieterich1979": _article(
-        "Dieterich, J. H.",
-        "Modeling of rock friction: 1. Experimental results and constitutive equations",
-        "Journal of Geophysical Research",
-        "84",
-        "2161--2168",
-        year="1979",
-        doi="10.1029/JB084iB05p02161",
-    ),
-    "ruina1983": _article(
-        "Ruina, A.",
-        "Slip instability and state variable friction laws",
-        "Journal of Geophysical Research",
-        "88",
-        "10359--10370",
-        year="1983",
-        doi="10.1029/JB088iB12p10359",
-    ),
-    "foreman2013": _article(
-        "Foreman-Mackey, D. and Hogg, D. W. and Lang, D. and Goodman, J.",
-        "emcee: The MCMC hammer",
-        "Publications of the Astronomical Society of the Pacific",
-        "125",
-        "306--312",
-        year="2013",
-        doi="10.1086/670067",
-    ),
+    )
 }
 
 

@@ -21,11 +21,8 @@ MIN_ENERGY_RATIO = 1e-9
 
 
 def share_of_work(config: Config, energies: Array, term: str) -> Array:
-    """A term of energy balances, relative to the work of the drive, forth and back, or the largest
-    term.
-
-    ``energies`` has the terms `ENERGY_COLUMNS` in its last dimension [J].
-    """
+    """A term of energy balances, with the terms `ENERGY_COLUMNS` last [J], relative to the work of
+    the drive, forth and back, or the largest term."""
     contacts = config.contacts
     gross = energies[..., ENERGY_COLUMNS.index("gross_work")]
     # Cycles may return all of the work.
@@ -43,11 +40,8 @@ def largest(values: Array) -> float:
 
 
 def failed_checks(config: Config, realizations: Sequence[Realization]) -> list[str]:
-    """A message with the fix for each check that failed.
-
-    The energy of every run is balanced to rounding, or to the tolerance of its solver. In the
-    master equation the steps do little work of their own, and the error of the force is bounded.
-    """
+    """A message with the fix for each failed check of the energy balance, of the work of steps, and
+    of the error of the force."""
     slider, contacts = config.slider, config.contact_kind
     remedies = "; ".join(text for text in (contacts.remedy, slider.remedy) if text)
     remedy = f"; {remedies}" if remedies else ""

@@ -76,7 +76,6 @@ class DamagedError(Exception):
 
 
 def checkpoint_folder(output: Path) -> Path:
-    """The folder of the checkpoint of an output."""
     return output.with_name(f"{output.stem}.checkpoint")
 
 
@@ -203,10 +202,8 @@ class Checkpoint:
         return self._write(realizations)
 
     def restore(self, realizations: Sequence[Realization]) -> float:
-        """Restore realizations from the checkpoint, if there is one; returns its wall time [s].
-
-        Raises a `FileError` if it is of another configuration or program, or in use.
-        """
+        """Restore realizations, if there is a checkpoint; returns its wall time [s]. A `FileError`
+        if it is in use or of another run."""
         with suppress(OSError):
             self._files.lock()
         there = [name for name in (STATE, PREVIOUS) if (self.folder / name).exists()]

@@ -270,10 +270,8 @@ class Kernel:
         self._call(_core.displace_drive, distance)
 
     def follow(self) -> None:
-        """Continue another run from its end, which was restored, with the second part of the drive.
-
-        Time, displacement and counts continue from those of the state.
-        """
+        """Continue another run from its restored end, with its time, displacement and counts, by
+        the second part of the drive."""
         self._call(_core.follow_simulation)
 
     def restore(self, words: Words) -> None:

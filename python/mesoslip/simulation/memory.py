@@ -42,10 +42,8 @@ def finer_samples(config: Config) -> float:
 
 
 def output_bytes(config: Config, *, has_finer: bool = True) -> float:
-    """Expected size of the output of a run, or of its tables in memory [bytes].
-
-    It counts the trace, snapshots at given times, and finer samples around slips if there are any.
-    """
+    """Expected size of the output of a run, or of its tables in memory, with snapshots and finer
+    samples [bytes]."""
     samples = config.expected_duration / config.output_interval + 1
     layers = config.slider.layers_recorded(config)
     blocks = len(BLOCK_NUMBERS) * config.slider.block_count
@@ -57,10 +55,8 @@ def output_bytes(config: Config, *, has_finer: bool = True) -> float:
 
 
 def check_memory(config: Config, available: float | None = None) -> None:
-    """Refuse a run whose record exceeds the available memory [bytes], by default the machine's.
-
-    The `ConfigError` names each key that needs too much.
-    """
+    """Refuse a run whose record exceeds the available memory [bytes], with a `ConfigError` for each
+    key that needs too much."""
     problems = memory_problems(config, available)
     if problems:
         raise ConfigError(problems)

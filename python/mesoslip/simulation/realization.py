@@ -389,7 +389,6 @@ class Realization(Recorded):
 
     @property
     def _is_new(self) -> bool:
-        """Whether it has not started."""
         return self._kernel is None and self._words is None and self.advances == 0
 
     @property

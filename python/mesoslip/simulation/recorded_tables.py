@@ -76,10 +76,8 @@ class RowFile:
         self._number: int | None = None
 
     def read(self, place: int, count: int) -> Array:
-        """Numbers from a place [bytes] on, fewer at the end of the file.
-
-        Raises a `RunError` if they cannot be read.
-        """
+        """Numbers from a place [bytes] on, fewer at the end of the file; a `RunError` if they
+        cannot be read."""
         try:
             if self._number is None:
                 self._number = regular_descriptor(self._path, os.O_RDONLY)
@@ -129,10 +127,8 @@ class Stored:
 
 
 class Rows:
-    """The rows of a table of one realization, in pieces; ``columns`` is the length of a row.
-
-    The thread of the realization adds pieces; another one writes them to files.
-    """
+    """The rows of a table of one realization with a number of columns, added by its thread and
+    written by another."""
 
     __slots__ = ("_count", "_lock", "_written", "columns", "pieces", "waiting_bytes")
 
@@ -200,8 +196,6 @@ NO_ROWS = {table: Rows(len(columns)) for table, columns in COLUMNS.items()}
 
 
 class FirstRows:
-    """The first rows of a table."""
-
     def __init__(self, rows: Rows, count: int) -> None:
         self._rows, self._count = rows, count
         self.columns = rows.columns
@@ -210,7 +204,6 @@ class FirstRows:
         return self._count
 
     def blocks(self, max_rows: int) -> Iterator[Array]:
-        """See `Rows.blocks`."""
         remaining = self._count
         for block in self._rows.blocks(max_rows):
             if remaining == 0:
@@ -219,7 +212,6 @@ class FirstRows:
             remaining -= min(remaining, len(block))
 
     def read(self) -> Array:
-        """See `Rows.read`."""
         return np.concatenate([np.empty((0, self.columns)), *self.blocks(max(1, self._count))])
 
 
@@ -243,7 +235,6 @@ class SnapshotRows:
             yield self._shaped(values)
 
     def read(self) -> Array:
-        """All snapshots."""
         return self._shaped(self._rows.read())
 
 

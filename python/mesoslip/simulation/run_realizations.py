@@ -203,10 +203,8 @@ def _collection_paused(is_wanted: bool) -> Iterator[None]:
 def compute_realizations(
     piece: tuple[dict[str, Any], Sequence[int]], stop: StopRequest
 ) -> tuple[float, list[tuple[Saved, dict[str, NDArray[np.float64]]]]]:
-    """Run realizations, given by nested tables and their numbers, in another process.
-
-    Returns the time that it took [s]; the state of each at the end, and its tables.
-    """
+    """Run realizations, by nested tables and their numbers, in another process: its time [s]; state
+    and tables of each."""
     tables, numbers = piece
     start = time.perf_counter()
     realizations = Realization.all_of(Config.from_dict(tables), numbers)
@@ -231,10 +229,8 @@ def run_in_turn(
     advance: Callable[[Realization], None],
     visit: Callable[[Sequence[Realization]], None] = lambda _: None,
 ) -> None:
-    """Run realizations one after another, short ones of several many at a time.
-
-    ``advance`` runs one of them, ``visit`` is called with those that have run together.
-    """
+    """Run realizations one after another with ``advance``, short ones many at a time, and ``visit``
+    those that have run together."""
     remaining = realizations
     while remaining and not stop.is_set():
         done = Realization.run_together(remaining) if len(realizations) > 1 else 0

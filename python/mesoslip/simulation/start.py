@@ -100,10 +100,8 @@ START = Start()
 
 
 def follow(config: Config, parameters: Parameters, number: int, end: End) -> tuple[Kernel, Start]:
-    """A kernel that continues another run with the same number, and its start.
-
-    The configurations may differ in the keys of `CONTINUED`; ``parameters`` are the contacts'.
-    """
+    """A kernel that continues another run of the same number, whose configuration may differ in the
+    keys of `CONTINUED`, and its start."""
     if config.pressing.varies:
         raise ConfigError(
             [

@@ -62,10 +62,8 @@ class Turns(NamedTuple):
 def counting_path(
     slider: SliderTable, response: Callable[[Complex], Parts], scale: float, turns: Turns
 ) -> Array:
-    """Frequencies along which the roots of a slider are counted [1/s], ascending from 0.
-
-    ``response`` gives Λ at rates [1/s], ``scale`` is a frequency of the slider [1/s].
-    """
+    """Ascending frequencies from 0 along which the roots of a slider of a frequency ``scale`` are
+    counted [1/s], by Λ at rates [1/s]."""
     # Beyond the last frequency the slider outweighs any response of the contacts.
     coarse = scale * np.geomspace(1e-2, 1e6, 1500)
     own = dynamic_stiffness(slider, 1j * coarse)
@@ -98,11 +96,8 @@ def search_path(
     turns: Turns,
     path: Array,
 ) -> Array | None:
-    """Ascending frequencies between which critical ones of any spring are sought [1/s].
-
-    ``path`` is the one along which roots are counted with the slider's own spring, without 0. None
-    if contacts feed a slider with stiff springs too fast for a path to resolve it.
-    """
+    """Ascending frequencies [1/s] between which critical ones of any spring are sought, by the path
+    of counting; None if contacts feed stiff springs too fast."""
     frequency = scale * np.geomspace(1e-2, 1e6, SEARCH_POINTS)
     parts = response(1j * frequency)
     # The fed part itself turns with lives, by as much as it is.
@@ -136,10 +131,8 @@ def _turning(parts: Parts) -> Array:
 
 
 def _turned_until(frequency: Array, turning: Array, rest: Array) -> float:
-    """Frequency up to which lives that are alike may change the sign of the imaginary part.
-
-    ``rest`` is this part [N/m] without what turns, at ascending frequencies.
-    """
+    """Frequency up to which lives that are alike may change the sign of the imaginary part, which
+    is ``rest`` [N/m] without them."""
     crossed = np.append(np.diff(np.sign(rest)) != 0, False)
     turned = np.flatnonzero((turning > SMALL_TURN * np.abs(rest)) | (crossed & (turning > 0)))
     return float(frequency[min(turned[-1] + 1, len(frequency) - 1)]) if turned.size else 0.0

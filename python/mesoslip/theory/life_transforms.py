@@ -66,10 +66,8 @@ class Transforms(NamedTuple):
 
 
 class LifeTransforms:
-    """Averages over the lives of the contacts of a configuration, without ageing and temperature.
-
-    The relative width of thresholds may differ from that of the configuration.
-    """
+    """Averages over lives without ageing and temperature, of the configuration or with another
+    relative width of thresholds."""
 
     def __init__(self, config: Config, relative_width: float) -> None:
         self.config = config
@@ -247,10 +245,8 @@ def _quadrature() -> tuple[Array, Array]:
 
 
 def _legendre_transforms(z: Complex, side: Array) -> Complex:
-    """∫ P_n(x) e^(-z (x + side)) dx over [-1, 1], shape (arguments, orders).
-
-    The side is the sign of the real part of z, so that no exponential is large.
-    """
+    """∫ P_n(x) e^(-z (x + side)) dx over [-1, 1], shape (arguments, orders), with the sign of the
+    real part of z as the side."""
     result = np.empty((len(z), POINTS), dtype=np.complex128)
     is_large = np.abs(z) > LARGE
     point, legendre = _quadrature()

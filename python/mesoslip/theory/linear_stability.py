@@ -321,10 +321,8 @@ class LinearStability(abc.ABC):
 
     @cached_property
     def _search_path(self) -> Array | None:
-        """Frequencies between which critical ones are sought, of any spring.
-
-        None if contacts feed a slider with stiff springs too fast for a path to resolve it.
-        """
+        """Frequencies between which critical ones of any spring are sought; None if contacts feed
+        stiff springs too fast."""
         path = self._path[1:]
         if self.delay == 0:
             return path
@@ -355,10 +353,8 @@ class LinearStability(abc.ABC):
 
     @property
     def work(self) -> int:
-        """Work of finding the roots, points of the path times the degree of the slider.
-
-        Ten thousand take about a tenth of a second.
-        """
+        """Work of finding the roots, points of the path times the degree of the slider; 10 000 take
+        about 0.1 s."""
         if not self._has_motion or self.is_passive:
             return 0
         slider = dynamic_stiffness(self.config.slider, np.array([1j * self._scale]))

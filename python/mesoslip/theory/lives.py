@@ -47,11 +47,8 @@ def law_parameters(config: Config, newborn_width: float = 0.0) -> Parameters:
 
 
 def newborn_stretch(config: Config) -> float | None:
-    """Standard deviation of the stretch at which contacts attach [m]; None if there is no theory.
-
-    It holds for contacts of one stiffness, of which none attaches with a force beyond its threshold
-    against the motion.
-    """
+    """Standard deviation of the stretch at which contacts attach [m]; None if they differ in
+    stiffness, or some would attach beyond their threshold."""
     contacts = config.contacts
     width, back = contacts.newborn_width, contacts.back_force_ratio
     if width == 0:

@@ -1,7 +1,4 @@
-"""The renewal equation of slow forward sliding, solved by collocation on panels of equal width.
-
-The solver is ``fortran/theory/renewal.f90``; here its values become polynomials.
-"""
+"""The renewal equation of slow forward sliding, whose solution becomes polynomials of panels."""
 
 from __future__ import annotations
 
@@ -38,10 +35,8 @@ class RenewalSolution:
 def solve_renewal(
     parameters: Parameters, start: float, width: float, panels: int
 ) -> RenewalSolution:
-    """Solve the renewal equation of a law, given by `mesoslip.theory.lives.law_parameters`.
-
-    ``start`` of the first panel and ``width`` of each are relative to the mean breaking stretch.
-    """
+    """Solve the renewal equation of a law by `law_parameters`, with start and width of panels over
+    the mean breaking stretch."""
     point, breaks, slope, force, stiffness, pinned, mismatch = checked(
         interruptible(_core.force_curve, *named(parameters), start, width, panels, POINTS)
     )

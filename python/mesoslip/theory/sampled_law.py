@@ -38,10 +38,8 @@ COVERAGE = 2.0
 
 @dataclass(frozen=True)
 class SampledLaw:
-    """Samples of contacts, and the bandwidth with which the density of ln x_s is estimated.
-
-    Break stretches over f_s/k, stiffnesses over k, and shares of the samples, shape (samples,).
-    """
+    """Break stretches over f_s/k, stiffnesses over k, and shares of samples, and the bandwidth of
+    the density of ln x_s."""
 
     stretch: Array
     stiffness: Array

@@ -1,7 +1,4 @@
-"""Quantities from a slider's keys alone: its dynamic stiffness, and others in closed form.
-
-Each function has a form for each kind of slider, chosen by the type of its table.
-"""
+"""Quantities from a slider's keys alone, in a form for each kind, by the type of its table."""
 
 from __future__ import annotations
 
@@ -85,10 +82,8 @@ def _layered_stiffness(slider: LayeredSlider, rate: Any) -> DynamicStiffness:
 
 
 def chain_stiffness(slider: LayeredSlider, rate: Any, stiffness: Any) -> tuple[Complex, Complex]:
-    """Numerator and denominator of the dynamic stiffness of a chain from the drive's spring down.
-
-    The static stiffness of all its springs may differ from that of the slider, and between rates.
-    """
+    """Numerator and denominator of the dynamic stiffness of a chain, whose static stiffness may
+    differ from the slider's and between rates."""
     mass = slider.mass / slider.layers
     spring = slider.layers * stiffness
     inertia = mass * rate**2
@@ -141,11 +136,8 @@ def _interface_scales(slider: InterfaceSlider, config: Any) -> RowScales | None:
 
 @singledispatch
 def mode_frequencies(slider: SliderTable) -> list[float]:  # noqa: ARG001
-    """Frequencies of layers with free contacts and with clamped ones, ascending [1/s].
-
-    Between a free one and the next clamped one lies one frequency of layers on undamped springs,
-    whatever their stiffness.
-    """
+    """Ascending frequencies of layers with free and with clamped contacts [1/s], between which one
+    on any undamped springs lies."""
     return []
 
 

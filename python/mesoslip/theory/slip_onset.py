@@ -112,10 +112,8 @@ def solve(
 
 
 def end_of_expansion(curve: ForceCurve) -> float:
-    """Displacement from X_c [m] at which the expansion of F about X_c no longer describes it.
-
-    It differs by `EXPANSION_ERROR` of F_s there, unless the curve ends before.
-    """
+    """Displacement from X_c [m] at which the expansion of F differs by `EXPANSION_ERROR` of F_s, or
+    the curve ends."""
     critical = curve.critical_points[0]
     spring = curve.config.spring_stiffness
     start = critical.displacement

@@ -1,7 +1,4 @@
-"""Steady sliding over velocity: F(v), dF/d ln v, and the springs with which it is stable.
-
-For contacts that age or break by thermal activation, whose force depends on how fast they slide.
-"""
+"""Steady sliding over velocity: F(v), dF/d ln v, and the springs with which it is stable."""
 
 from __future__ import annotations
 

@@ -27,10 +27,8 @@ def sliding_of(config: Config, velocity: float | None = None) -> LinearStability
 
 @lru_cache(maxsize=16)
 def steady_sliding(config: Config, max_work: int) -> LinearStability | None:
-    """Steady sliding of a configuration; None without a theory, or if it takes more work.
-
-    The latest results are cached, as several functions ask for the same configuration.
-    """
+    """Steady sliding of a configuration, cached; None without a theory, or if it takes more
+    work."""
     try:
         sliding = sliding_of(config)
     except ConfigError:

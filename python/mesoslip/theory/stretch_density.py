@@ -31,11 +31,8 @@ def stretch_density(
     newborn_width: float,
     mean_life: float,
 ) -> tuple[Array, float]:
-    """Q(x; X) at stretches x, shape (points), and the fraction of contacts that are all at x = X.
-
-    The integral and the fraction add up to 1. ``breaks`` is Γ over displacement, NaN outside the
-    curve; ``mean_life`` the mean displacement from attaching to breaking.
-    """
+    """Q(x; X) at stretches x, shape (points), and the fraction at x = X, both adding up to 1; by Γ
+    and the mean life as displacement."""
     return _Density(config, breaks, newborn_width, mean_life).at(stretch, displacement)
 
 

@@ -77,10 +77,8 @@ class TableLives(NamedTuple):
     def newborn_density(
         self, stretch: Array, moved: float, shift: float, breaks: Callable[[Array], Array]
     ) -> Array:
-        """Density of stretches of contacts that attached within ``moved`` of the start.
-
-        ``shift`` is their stretch at attaching beyond f_b/k; ``breaks`` is Γ over displacement.
-        """
+        """Density of stretches of contacts attached within ``moved`` of the start, with ``shift``
+        beyond f_b/k, by Γ over displacement."""
 
         def density(x: Array) -> Array:
             age = x[:, None] - shift - self.attached

@@ -17,10 +17,8 @@ MAX_DEVIATE = 8.0
 
 
 def threshold_quadrature(config: Config, panels: int, points: int) -> tuple[Array, Array]:
-    """Weights and points of a quadrature over the configured thresholds, relative to the mean.
-
-    Both have the shape (panels × points); the weights add up to 1.
-    """
+    """Points and weights, which add up to 1, of a quadrature over configured thresholds over the
+    mean, shape (panels × points)."""
     # scipy takes long to import.
     from scipy import special
 

@@ -74,8 +74,7 @@ def avalanche_sizes(trees: Sequence[xr.DataTree]) -> Figure:
     stationary.set_title("sliding, stationary", loc="left")
     failing.set_title("fibre bundle", loc="left")
     for axes in (stationary, failing):
-        axes.set_xlabel("avalanche size $s$")
-        axes.set_ylabel("$P(s)$")
+        axes.set(xlabel="avalanche size $s$", ylabel="$P(s)$")
         axes.set_ylim(bottom=1e-10)
         axes.set_xlim(0.7, 3e5 if axes is stationary else 2e4)
         axes.legend(loc="lower left")

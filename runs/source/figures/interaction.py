@@ -37,8 +37,7 @@ def detaching(trees: Sequence[xr.DataTree]) -> Figure:
         )
         sizes = group_of(tree, "avalanches")["size"].values
         axes.set_title(f"({letter}) {_strength(tree)}; largest: {sizes.max()}", loc="left")
-        axes.set_ylabel("$N_d$")
-        axes.set_xlabel("time in the first slip (ms)")
+        axes.set(ylabel="$N_d$", xlabel="time in the first slip (ms)")
     return figure
 
 
@@ -56,8 +55,7 @@ def interacting_slips(trees: Sequence[xr.DataTree]) -> Figure:
         draw_series(axes, tree, "spring_force", window=window, time_unit=1e-3, **SPRING)
         axes.axhline(0, color="0.8", linewidth=0.6, zorder=0)
         axes.set_title(f"({letter}) {_strength(tree)}", loc="left")
-        axes.set_ylabel("force (µN)")
-        axes.set_xlabel("time in the first slip (ms)")
+        axes.set(ylabel="force (µN)", xlabel="time in the first slip (ms)")
     all_axes[0].legend()
     return figure
 

@@ -23,8 +23,7 @@ def stick_slip(trees: Sequence[xr.DataTree]) -> Figure:
     figure = Figure(figsize=(6.5, 3.6))
     axes = figure.subplots()
     draw_series(axes, tree, "spring_force", color="black")
-    axes.set_xlabel("time (s)")
-    axes.set_ylabel("spring force $F_d$ (µN)")
+    axes.set(xlabel="time (s)", ylabel="spring force $F_d$ (µN)")
     axes.set_xlim(0, tree["time"].max().item())
     slip = largest_slip(tree)
     if slip is not None:
@@ -128,8 +127,7 @@ def layers(trees: Sequence[xr.DataTree]) -> Figure:
         axes.set_ylim(low, high + 0.7 * (high - low))
         inset.tick_params(labelsize=6)
         inset.set_xlabel("time (s)", fontsize=6)
-        axes.set_xlabel("time in the first slip (ms)")
-        axes.set_ylabel(f"({letter}) {title} (µN)")
+        axes.set(xlabel="time in the first slip (ms)", ylabel=f"({letter}) {title} (µN)")
         axes.legend(loc="lower left")
     return figure
 
@@ -157,8 +155,7 @@ def viscosities(trees: Sequence[xr.DataTree]) -> Figure:
                 time_unit=1e-3,
                 linestyle=style,
             )
-    whole.set_xlabel("time (s)")
-    whole.set_ylabel("spring force $F_d$ (µN)")
+    whole.set(xlabel="time (s)", ylabel="spring force $F_d$ (µN)")
     whole.legend()
     detail.set_xlabel("time in the first slip (ms)")
     return figure

@@ -25,7 +25,6 @@ def stacked(trees: Sequence[xr.DataTree], title: Callable[[xr.DataTree], str]) -
     for letter, axes, tree in zip("abcdefgh", panels, trees, strict=False):
         draw_series(axes, tree, "spring_force", color="black")
         axes.set_title(f"({letter}) {title(tree)}", loc="left")
-        axes.set_ylabel("$F_d$ (µN)")
-        axes.set_xlim(0, tree["time"].max().item())
+        axes.set(ylabel="$F_d$ (µN)", xlim=(0, tree["time"].max().item()))
     panels[-1].set_xlabel("time (s)")
     return figure

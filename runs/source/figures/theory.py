@@ -32,10 +32,7 @@ def force_over_displacement(trees: Sequence[xr.DataTree]) -> Figure:
         color="black",
     )
     axes.axhline(tree.attrs["F_steady"] / contacts.static_force, color="0.8", zorder=0)
-    axes.set_xlabel("displacement $X$")
-    axes.set_ylabel("force $F(X)$")
-    axes.set_xlim(0, 6)
-    axes.set_ylim(0, 1)
+    axes.set(xlabel="displacement $X$", ylabel="force $F(X)$", xlim=(0, 6), ylim=(0, 1))
     return figure
 
 
@@ -66,14 +63,11 @@ def onset_of_slip(trees: Sequence[xr.DataTree]) -> Figure:
                 tau = onset.attrs["omega_s"] * (times - times[start])
                 axes.plot(tau, (force - force[start]) / static, **style)
             _draw_onset(axes, onset)
-            axes.set_xlabel(r"$\tau = \Omega_S (t - t_c)$")
-            axes.set_ylabel(r"$\Delta F_d/F_s$")
+            axes.set(xlabel=r"$\tau = \Omega_S (t - t_c)$", ylabel=r"$\Delta F_d/F_s$")
         whole, start_of_slip = columns
-        whole.set_xlim(0, 5)
-        whole.set_ylim(-2.1, 0.1)
+        whole.set(xlim=(0, 5), ylim=(-2.1, 0.1))
         end = 3 * onset.attrs["expansion_end_time"]
-        start_of_slip.set_xlim(0, end)
-        start_of_slip.set_ylim(-0.02 * end**2, 0.002 * end**2)
+        start_of_slip.set(xlim=(0, end), ylim=(-0.02 * end**2, 0.002 * end**2))
         whole.set_title(
             rf"$\Delta f_s/f_s$ = {width:g}"
             "\n"
@@ -124,13 +118,11 @@ def limit_of_many_contacts(trees: Sequence[xr.DataTree]) -> Figure:
         label=f"$N$ = {counts[0]}",
     )
     force.plot(times, infinite * 1e6, color="black", label=r"$N \to \infty$")
-    force.set_xlabel("time (s)")
-    force.set_ylabel("contact force (µN)")
+    force.set(xlabel="time (s)", ylabel="contact force (µN)")
     force.legend()
     difference.loglog(counts, errors, "o", color="black", markersize=4)
     slope = errors[-1] * np.sqrt(counts[-1] / np.array(counts))
     difference.loglog(counts, slope, color=RED, linestyle="--", label="$N^{-1/2}$")
-    difference.set_xlabel("$N$")
-    difference.set_ylabel("rms difference over $F_s$")
+    difference.set(xlabel="$N$", ylabel="rms difference over $F_s$")
     difference.legend()
     return figure

@@ -105,10 +105,8 @@ class Source:
 
 
 def p_value(tally: Tally, law: Law, replicas: int, generator: np.random.Generator) -> float:
-    """Share of samples, the sizes and synthetic ones, that fit as badly as the sizes or worse.
-
-    They are ranked by the worse of their ranks by distance and by χ².
-    """
+    """Share of samples that fit as badly as the sizes or worse, by the worse of their ranks by
+    distance and by χ²."""
 
     def misfit_of(sample: Tally) -> Misfit:
         # The tail of very steep laws may be too short for a fit; then any law fits.

@@ -237,10 +237,8 @@ def likeliest_law(form: Form, tally: Tally, pure: Law) -> Law | None:
 def _newton(
     form: Form, tally: Tally, pure: Law, start: list[float], scale: float = 1.0
 ) -> Law | None:
-    """The likeliest law by Newton's method, with steps halved until the cost decreases.
-
-    None if the likelihood has no maximum at a finite cutoff, or no definite maximum.
-    """
+    """The likeliest law by Newton's method with halved steps; None if the likelihood has no
+    definite maximum at a finite cutoff."""
     rule = sum_rule(pure.min_size, pure.max_size)
     moments_of = _moments if form.cutoff_shape else _uncut_moments
     features = _features(form, pure.min_size, scale, rule.log_ratio, rule.offset)

@@ -20,11 +20,8 @@ MIN_RATE = 2.0**-47
 
 @lru_cache
 def _block(length: int) -> tuple[Array, Array]:
-    """Nodes and weights of a sum over the integers from 0 below a length.
-
-    Gauss's rule of the polynomials that are orthogonal on these integers: exact for polynomials of
-    degree 2 NODES - 1.
-    """
+    """Gauss's rule for a sum over the integers from 0 below a length, exact for polynomials of
+    degree 2 NODES - 1."""
     if length <= DIRECT:
         return np.arange(length, dtype=np.float64), np.ones(length)
     k = np.arange(1.0, NODES)

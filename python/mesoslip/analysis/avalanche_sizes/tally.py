@@ -74,10 +74,8 @@ class LogarithmicBins:
 
 
 def logarithmic_bins(sizes: ArrayLike, per_decade: int = 10) -> LogarithmicBins:
-    """The histogram of sizes in bins of equal logarithmic width, as far as integers allow.
-
-    The edges do not depend on the sizes; empty bins are left out.
-    """
+    """The histogram of sizes in bins of equal logarithmic width, with edges that do not depend on
+    the sizes and without empty bins."""
     different, counts = tally_of(sizes)
     if not len(different):
         empty = np.empty(0)

@@ -149,10 +149,8 @@ def _with_detection(magnitude: Array) -> BValue:
 
 
 def _fit(magnitude: Array, completeness: float) -> BValue | None:
-    """Aki's estimate from magnitudes above a completeness; None for too few.
-
-    The sum of n of them above the completeness has a gamma distribution.
-    """
+    """Aki's estimate from magnitudes above a completeness, whose sum has a gamma distribution; None
+    for too few."""
     from scipy.special import gammaincinv
 
     kept = magnitude[magnitude >= completeness]

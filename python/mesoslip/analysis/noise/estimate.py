@@ -78,10 +78,8 @@ class TraceNoise:
         return without_impulses(time, cleaned, self.impulse_time)
 
     def linear_error(self, time: Array, weights: Array) -> float:
-        """Standard error of a weighted sum of samples, sum_i w_i F_i, by the noise of the trace.
-
-        The weights w are smooth over the correlation time.
-        """
+        """Standard error of a sum of samples with weights that are smooth over the correlation
+        time."""
         variance = self.deviation**2 * float(weights @ weights)
         if self.correlated_deviation > 0 and self.correlation_time > 0:
             # Neighbours are summed, so that there are some hundred points.
@@ -217,10 +215,8 @@ def estimate_noise(time: Array, force: Array, *, hum: float | None = None) -> Tr
 
 
 def _drift(time: Array, force: Array) -> float:
-    """Slope through medians of blocks, by the median of slopes, if it is significant.
-
-    The first loading of a trace that starts relaxed is left out.
-    """
+    """Slope through medians of blocks after the first loading, by the median of slopes, if it is
+    significant."""
     start = _end_of_loading(force)
     time, force = time[start:], force[start:]
     if len(time) < 4 * DRIFT_BLOCKS:

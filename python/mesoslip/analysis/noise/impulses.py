@@ -24,11 +24,8 @@ MIN_JUMP = 0.5
 
 
 def find_impulses(force: Array, noise: float) -> NDArray[np.bool_]:
-    """Whether each sample is in an impulse; the noise is a standard deviation.
-
-    Slips are excluded because their sides differ, ringing because its neighbouring samples scatter
-    as much.
-    """
+    """Whether each sample is in an impulse, not in a slip or in ringing; the noise is a standard
+    deviation."""
     from scipy.ndimage import median_filter
 
     if len(force) < 2 * SCATTER_WIDTH:
@@ -61,10 +58,8 @@ def find_impulses(force: Array, noise: float) -> NDArray[np.bool_]:
 
 
 def _height_above(force: Array, starts: NDArray[np.int_], ends: NDArray[np.int_]) -> Array:
-    """Distance of the middle of each group of samples from the lines through its neighbours.
-
-    Negative if the middle is between the lines.
-    """
+    """Distance of the middle of each group of samples from the lines through its neighbours,
+    negative between them."""
     middle = (starts + ends - 1) // 2
     last = len(force) - 1
     sides = []

@@ -56,10 +56,8 @@ def noise_level(force: Array) -> float:
 
 
 def digital_step_of(force: Array) -> float:
-    """Step of a digitized trace: the smallest difference of distinct values beyond rounding.
-
-    0 if there are too many distinct values.
-    """
+    """Step of a digitized trace, the smallest difference of distinct values; 0 if there are too
+    many of them."""
     values = np.unique(force)
     if not 1 < values.size < MAX_DISTINCT * len(force):
         return 0.0

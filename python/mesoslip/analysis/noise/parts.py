@@ -26,7 +26,6 @@ class Part:
 
     @property
     def samples(self) -> slice:
-        """The samples of the part."""
         return slice(self.first, self.after)
 
     def __len__(self) -> int:
@@ -34,11 +33,8 @@ class Part:
 
 
 def parts_of(time: Array) -> tuple[Part, ...]:
-    """Parts of a record of increasing times [s] with one sampling interval each.
-
-    Filters of a number of samples run within a part. A gap does not end a part: the values on both
-    sides are neighbours.
-    """
+    """Parts of a record of increasing times [s] with one sampling interval each; gaps do not end a
+    part."""
     from scipy.ndimage import median_filter
 
     if len(time) < 2:

@@ -67,8 +67,6 @@ SIGNALS = ("speed", "load", FORCE)
 
 @dataclass(frozen=True)
 class Plateaus:
-    """The plateaus of an output."""
-
     columns: Mapping[str, NDArray[Any]]
     """Columns in SI, each of shape (rows,)."""
     force_unit: str

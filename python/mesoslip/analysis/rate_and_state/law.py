@@ -126,11 +126,8 @@ class RateAndState:
     def forces(
         self, at: Array, tolerance: float = TOLERANCE, *, coarse: bool = False
     ) -> tuple[Array, Array, NDArray[np.bool_]]:
-        """Forces over the range and displacements over that of the load point, each of shape (sets,
-        points), of sets of parameters; whether each failed.
-
-        A coarse point is the motion at its mean time, not the mean over its samples.
-        """
+        """Forces over the range and displacements over that of the load point of sets of
+        parameters, shape (sets, points); whether each set failed."""
         points, found = self.points, self.parameters(at)
         table = np.stack([found[name] for name in OF_MOTION])
         stiffness, trend = table[-2:]
@@ -181,7 +178,6 @@ class RateAndState:
         return slopes
 
     def bounds(self) -> tuple[Array, Array]:
-        """Bounds of the search."""
         near, far = self.distances[0] / MARGIN, self.distances[1] * MARGIN
         ranges = {
             "a": (MIN_A, MAX_A),

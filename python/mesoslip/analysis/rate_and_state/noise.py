@@ -133,10 +133,8 @@ def _mean_square(size: Array, change: Array) -> Array:
 
 @dataclass(frozen=True)
 class NoiseModel:
-    """White noise of the samples and noise with a correlation time, of any size.
-
-    A point is the mean of its samples, which lie between two times.
-    """
+    """White noise of samples and noise with a correlation time; points are means of samples between
+    two times."""
 
     start: Array
     """Start of each point [s]."""
@@ -163,20 +161,14 @@ class NoiseModel:
         return cls(start, end, points.count, (shortest, longest))
 
     def covariance(self, deviation: float, share: float, time: float) -> Array:
-        """Covariance of the points, shape (points, points).
-
-        Given are the standard deviation of a sample, the share of the correlated noise in its
-        variance, and its correlation time [s].
-        """
+        """Covariance of the points, by the standard deviation of a sample, the share of correlated
+        noise in its variance, and its correlation time [s]."""
         correlated = averaged_covariance(self.start, self.end, time)
         return deviation**2 * (share * correlated + np.diag((1 - share) / self.count))
 
     def log_likelihood(self, residual: Array, deviation: Array, share: Array, time: Array) -> Array:
-        """Logarithm of the normal density of residuals, shape (sets,), by `covariance` without its
-        matrix.
-
-        Residuals have the shape (sets, points), the parameters of the noise (sets,).
-        """
+        """Logarithm of the normal density, shape (sets,), of residuals of shape (sets, points), by
+        `covariance` without its matrix."""
         value = _core.noise_log_densities(
             self.start, self.end, self.count, residual.T, deviation, share, time
         )

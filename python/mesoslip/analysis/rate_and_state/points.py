@@ -65,7 +65,6 @@ class Points:
 
     @property
     def force_range(self) -> float:
-        """Range of the force."""
         return max(float(np.ptp(self.force)), 1e-300)
 
     @property

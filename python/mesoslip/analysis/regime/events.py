@@ -81,10 +81,8 @@ NO_SLIPS = Slips(*np.empty((4, 0)))
 
 
 def events_of(slips: Slips, cycles: Cycles, loading: float) -> tuple[Cycles, bool]:
-    """The events of a motion, and whether they are its slips.
-
-    ``loading`` is that of the spring by the drive, K v t; 0 if any share of slips is enough.
-    """
+    """The events of a motion, and whether they are its slips; ``loading`` by the drive is K v t, 0
+    if any share of slips is enough."""
     found = slips.large.as_cycles
     if len(found.periods) < MIN_CYCLES:
         return cycles, False
@@ -96,10 +94,8 @@ def events_of(slips: Slips, cycles: Cycles, loading: float) -> tuple[Cycles, boo
 
 
 def find_cycles(time: Array, force: Array, clipped: Array, turning: float) -> Cycles:
-    """Cycles of a force, separated by reversals of the clipped force above a threshold.
-
-    Falls are those of the clipped force, peaks those of the force.
-    """
+    """Cycles of a force between reversals of the clipped force above a threshold, with falls of
+    that and peaks of the force."""
     # Only the local extremes can be peaks and lows.
     rises = np.diff(force) > 0
     extremes = np.flatnonzero(rises[1:] != rises[:-1]) + 1

@@ -56,10 +56,8 @@ STICKING = 0.5
 def classify(
     scales: Scales, time: Array, force: Array, velocity: Array, slips: Slips
 ) -> RegimeResult:
-    """The regime of a motion by its evaluated window and the slips of the realization.
-
-    The velocity of the slider [m/s] is NaN if it is unknown.
-    """
+    """The regime of a motion by its evaluated window and the slips of the realization; an unknown
+    velocity [m/s] is NaN."""
     if len(time) < 2 * MIN_CYCLES:
         return RegimeResult()
     stage = scales.stage

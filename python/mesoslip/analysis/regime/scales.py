@@ -88,10 +88,8 @@ class Scales:
     def of_measurement(
         cls, apparatus: Apparatus, stage: Stage, force: Array, noise: float
     ) -> Scales:
-        """Scales of a measured trace without a configuration.
-
-        The static force is the maximum of the evaluated force; ``noise`` is a standard deviation.
-        """
+        """Scales of a measured trace without a configuration, whose static force is the maximum
+        force; ``noise`` is a standard deviation."""
         return cls(
             stage,
             float(np.max(np.abs(force), initial=0.0)),

@@ -16,12 +16,9 @@ MAX_POINTS = 2000
 def decay(
     displacement: Array, force: Array, correlation: float, noise: float
 ) -> tuple[float, float] | None:
-    """Length of an exponential decay of a force over an ascending displacement [m], both of shape
-    (samples,), and its standard error; None if the samples do not determine it.
-
-    The noise is a standard deviation about the decay, the correlation a number of samples per
-    independent sample.
-    """
+    """Length of an exponential decay of a force over ascending displacements [m], and its standard
+    error, from the standard deviation of the noise and samples per independent sample; None if it
+    is not determined."""
     from scipy.optimize import OptimizeWarning, curve_fit
 
     distance = float(displacement[-1] - displacement[0])

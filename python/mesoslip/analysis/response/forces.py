@@ -164,11 +164,8 @@ def friction_line(data: Arrays) -> Line | None:
 
 
 def restart_rows(experiment: Experiment, number: int) -> list[dict[str, Any]]:
-    """Each stage of constant force after a smaller constant force, or none.
-
-    The slider has restarted when it has moved by the mean breaking stretch f_s/k since the end of
-    the hold.
-    """
+    """Each stage of constant force after a smaller one: the slider restarts when it has moved by
+    f_s/k since the hold."""
     rows = []
     for hold, stage in itertools.pairwise(experiment.stages):
         if not (hold.is_constant_force and stage.is_constant_force):

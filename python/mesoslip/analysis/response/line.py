@@ -26,11 +26,8 @@ class Line:
 
 
 def line(x: Array, y: Array, error: Array) -> Line | None:
-    """A line through points with errors; None if there are fewer than two different x.
-
-    Points without a positive error have equal weights, and the error of the slope follows from
-    their scatter about the line.
-    """
+    """A line through points with errors, or else with an error from their scatter; None for fewer
+    than two different x."""
     good = np.isfinite(x) & np.isfinite(y)
     x, y, error = x[good], y[good], error[good]
     if np.unique(x).size < 2:

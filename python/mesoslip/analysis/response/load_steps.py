@@ -83,7 +83,6 @@ def _steps(load: Array, samples: slice) -> list[_Step]:
 def _row(
     experiment: Experiment, number: int, stage: Stage, load: Array, step: _Step
 ) -> dict[str, Any]:
-    """The row of a step."""
     forces = stage.direction * experiment.force
     first, last = load[step.start : step.before + 1], load[step.after : step.end + 1]
     loads = float(np.median(first)), float(np.median(last))

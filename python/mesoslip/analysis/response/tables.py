@@ -49,7 +49,6 @@ class _Column:
         return self.is_optional and all(math.isnan(row[self.name]) for row in rows)
 
     def cells(self, rows: Sequence[Row]) -> tuple[str, ...]:
-        """The header and the cells."""
         values = [row[self.name] for row in rows]
         if self.is_stage:
             return (self.header, *("all" if one < 0 else str(one) for one in values))

@@ -69,18 +69,14 @@ class Choice(NamedTuple):
 
 
 def chosen(every: Iterable[Level]) -> Choice:
-    """The smallest minimum fall at which slips stand out.
-
-    Of the medians that find about as many, the one with the longest plateau of their number.
-    """
+    """The smallest minimum fall at which slips stand out, of the median with the longest plateau of
+    those that find about as many."""
     return max((_at(level) for level in every), key=_persistence)
 
 
 def _persistence(choice: Choice) -> float:
-    """Number of slips times the length of its plateau, in steps of the minimum fall.
-
-    0 if the median is wider than half the time between slips.
-    """
+    """Number of slips times the length of its plateau in steps of the minimum fall; 0 for a median
+    wider than half the time between slips."""
     waiting = np.diff(choice.level.trace.time[choice.tops])
     if waiting.size and choice.level.width > float(np.median(waiting)) / 2:
         return 0.0

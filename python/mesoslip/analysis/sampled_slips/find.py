@@ -72,10 +72,8 @@ def fall_rates(level: Level, period: float, tops: Samples, bottoms: Samples) -> 
 def ends_of(
     time: Array, force: Array, tops: Samples, bottoms: Samples, noise: float, half: Samples
 ) -> tuple[Samples, Samples, Array, Array]:
-    """Samples at which slips start and end, and the forces there, averaged over the noise.
-
-    ``half`` is half a period in samples, for each slip.
-    """
+    """Samples at which slips start and end, and the forces there averaged over the noise; ``half``
+    is half a period in samples."""
     # The force grows slowly before a slip, so that noise determines which sample is the maximum.
     # The level is that of a line through the samples before, and the slip starts where means over
     # some samples fall below it.
@@ -224,11 +222,8 @@ def _level_of(every: Iterator[Level], min_fall: float) -> Level:
 
 
 def estimated_period(time: Array, force: Array, noise: float) -> float:
-    """Period of the setup [s], estimated from the deepest falls of a trace; infinite without falls.
-
-    The force of a slider without contacts falls for half a period of a sine; contacts that attach
-    shorten the fall.
-    """
+    """Period of the setup [s], from the deepest falls of a trace, which contacts that attach
+    shorten; infinite without falls."""
     period = math.inf
     for level in levels(time, np.asarray(force, dtype=float), noise):
         if level.width > period / 4:

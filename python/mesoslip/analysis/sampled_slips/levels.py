@@ -77,10 +77,8 @@ class Side:
     def exceeding(
         self, threshold: float, *, with_rebounds: bool = False
     ) -> tuple[Samples, Samples]:
-        """Samples of maximum and minimum of falls that exceed rebounds by a threshold.
-
-        A fall from the first sample on has no start. With rebounds, they are all the others.
-        """
+        """Samples of maximum and minimum of falls after the first sample that exceed rebounds by a
+        threshold; with rebounds, those of the others."""
         rank = self.extremes.rank(threshold)
         if rank not in self._excess:
             self._excess[rank] = self._excess_of(*self.extremes.falls(threshold))
@@ -141,10 +139,8 @@ class Side:
         return self._ratios.of(tops, bottoms)
 
     def numbers(self, threshold: float) -> tuple[int, int]:
-        """Numbers of slips above a threshold, and of falls much faster than the rises before.
-
-        Steep falls of the mirror image are of noise, which makes as many in both.
-        """
+        """Numbers of slips above a threshold, and of falls much faster than the rises before, of
+        which noise makes as many in the mirror image."""
         if not self.extremes.has_falls(threshold):
             return 0, 0
         ratios = self.ratios(*self.falls(threshold))
@@ -235,10 +231,8 @@ def levels(
     loading_rate: float | None = None,
     min_fall: float = math.inf,
 ) -> Iterator[Level]:
-    """The trace after running medians, from narrow to wide, until noise is negligible.
-
-    Falls are those above the noise, or above a smaller minimum. Long traces are held one at a time.
-    """
+    """The trace after running medians, from narrow to wide, until noise is negligible; long ones
+    are held one at a time."""
     parts = parts_of(time)
     interval = max(parts, key=len).interval
     if isinstance(noise, TraceNoise):

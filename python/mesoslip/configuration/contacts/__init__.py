@@ -1,7 +1,4 @@
-"""Kinds of contacts, each in a file of its own and listed here.
-
-Adding a kind is adding a file with a `ContactKind` and naming it in `KINDS`.
-"""
+"""Kinds of contacts, each in a file of its own and listed here."""
 
 from __future__ import annotations
 
@@ -38,10 +35,8 @@ def contact_kind(
     interaction: Interaction | None,
     load: Load,
 ) -> ContactKind:
-    """The kind of contacts of an engine that answers most of the given keys.
-
-    Those that it does not answer are among its problems.
-    """
+    """The kind of contacts of an engine that answers most of the given keys; the others are among
+    its problems."""
     kinds = [kind for kind in KINDS if kind.engine == engine and kind.features <= given]
     return max(kinds, key=lambda kind: len(kind.features))(interaction, load)
 

@@ -56,10 +56,7 @@ class Setting(Protocol):
 
 
 class SliderTable(Table):
-    """A kind of slider: its keys, its parameters in the kernel, and the combinations it refuses.
-
-    The defaults are those of a slider without inertia, slips or layers.
-    """
+    """A kind of slider; its defaults are those without inertia, slips or layers."""
 
     # Whether it has no inertia: contacts break in avalanches while the drive stands still.
     jumps: ClassVar[bool] = False
@@ -115,7 +112,6 @@ class SliderTable(Table):
 
     @property
     def layer_count(self) -> int:
-        """Number of layers of the slider."""
         return 1
 
     @property

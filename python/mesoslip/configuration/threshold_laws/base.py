@@ -47,5 +47,4 @@ class ThresholdLawKind:
         return ""
 
     def kernel_parameters(self, keys: Keys) -> Parameters:
-        """Parameters of the law in the kernel."""
         return {"relative_width": keys.relative_width}

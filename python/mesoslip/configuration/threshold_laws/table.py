@@ -48,7 +48,6 @@ class LawCells(NamedTuple):
 
     @property
     def kernel_parameters(self) -> Parameters:
-        """Parameters of the law in the kernel."""
         return {
             "threshold_edges": tuple(self.edges.tolist()),
             "threshold_weights": tuple(self.weights.tolist()),
@@ -78,7 +77,6 @@ class StretchCells(NamedTuple):
 
     @property
     def kernel_parameters(self) -> Parameters:
-        """Parameters of the law in the kernel."""
         return {
             "threshold_edges": tuple(self.edges.tolist()),
             "threshold_weights": tuple(self.weights.tolist()),

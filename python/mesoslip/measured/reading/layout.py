@@ -238,10 +238,7 @@ def _are_units(cells: Sequence[str]) -> bool:
 
 
 def header_cells(line: str, delimiter: str, decimal: str, count: int) -> tuple[str, ...] | None:
-    """Cells of a line as a header of a number of columns; None if it is not one.
-
-    Headers may be comments, and have another delimiter than the numbers.
-    """
+    """Cells of a line, or comment, as a header of a number of columns; None if it is not one."""
     bare = line.lstrip(MARKERS) if COMMENT.match(line) else line.lstrip(" ")
     for cells in _splittings(bare, delimiter):
         if len(cells) == count + 1 and not cells[-1]:

@@ -17,10 +17,8 @@ MEMBER = "xl/workbook.xml"
 
 
 def text_of_workbook(path: Path, data: bytes, sheet: str | None) -> tuple[bytes, str]:
-    """The cells of a sheet as lines of a text, and a note about the sheet.
-
-    The sheet is the given one, or the one with the most numbers. Line n of the text is row n.
-    """
+    """The cells of a sheet, by default that with the most numbers, as lines of a text, and a note
+    about the sheet."""
     try:
         openpyxl = needed("openpyxl", "a workbook (.xlsx)", "openpyxl")
         # Without links to other workbooks, and with the results of formulas.

@@ -1,7 +1,4 @@
-"""The views: a file each, with its `View` in the variable ``VIEW``.
-
-Adding one is adding a file to this folder, and its name to the build.
-"""
+"""The views: a file each, with its `View` in the variable ``VIEW``."""
 
 from __future__ import annotations
 

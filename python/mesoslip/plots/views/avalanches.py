@@ -106,10 +106,8 @@ def scaling_sizes(tree: DataTree) -> Array:
 def draw_distribution(
     axes: Axes, sizes: Array, fit: PowerLawFit | None = None, law: str = "", **style: Any
 ) -> None:
-    """Draw the density of avalanche sizes in logarithmic bins with intervals of 68 %.
-
-    The power law fitted to them is a line over its range, in the same colour if it has no label.
-    """
+    """Draw the density of avalanche sizes in logarithmic bins with intervals of 68 %, and the
+    fitted power law."""
     bins = logarithmic_bins(sizes)
     style = POINTS | {"markersize": 2.5, "elinewidth": 0.7} | style
     ends = counting_interval(bins.count) * bins.density / bins.count
@@ -135,13 +133,11 @@ def counting_interval(count: NDArray[np.int64]) -> Array:
 
 
 def _label_density(axes: Axes) -> None:
-    axes.set_xlabel("avalanche size $s$")
-    axes.set_ylabel("$P(s)$")
+    axes.set(xlabel="avalanche size $s$", ylabel="$P(s)$")
 
 
 def _label_cumulative(axes: Axes) -> None:
-    axes.set_xlabel("avalanche size $s$")
-    axes.set_ylabel("$P(S \\geq s)$")
+    axes.set(xlabel="avalanche size $s$", ylabel="$P(S \\geq s)$")
 
 
 VIEW = View(

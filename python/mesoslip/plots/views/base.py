@@ -79,7 +79,6 @@ class View:
     """Whether `mesoslip.output.arrays.Arrays` has all that it needs of an output."""
 
     def draw(self, tree: DataTree, options: Options, figure: Canvas | None) -> Canvas:
-        """Draw an output."""
         with styled():
             if self.draw_all is not None:
                 return self.draw_all(tree, options, figure)

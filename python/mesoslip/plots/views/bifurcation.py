@@ -46,8 +46,7 @@ def draw_peaks(axes: Axes, trees: Sequence[DataTree], _: Sequence[str], options:
         )
     if values.min() > 0 and values.max() > MIN_LOG_RATIO * values.min():
         logarithmic(axes, "x")
-    axes.set_xlabel(across.label(name_of(key)))
-    axes.set_ylabel(up.label("force at the starts of slips"))
+    axes.set(xlabel=across.label(name_of(key)), ylabel=up.label("force at the starts of slips"))
 
 
 def _differing_key(tables: Sequence[dict[str, object]]) -> str:

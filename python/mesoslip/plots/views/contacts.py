@@ -82,9 +82,7 @@ class _Histogram:
         axes.set_xlim(edges[0], edges[-1])
         # A few contacts that break are visible beside many that do not.
         axes.set_yscale("symlog", linthresh=10)
-        axes.set_ylim(0, 1.5 * highest)
-        axes.set_xlabel(self.scale.label("stretch"))
-        axes.set_ylabel("contacts")
+        axes.set(ylim=(0, 1.5 * highest), xlabel=self.scale.label("stretch"), ylabel="contacts")
         legend_above(axes)
 
     def _counts(self, values: Array) -> NDArray[np.intp]:

@@ -35,8 +35,7 @@ def draw(tree: DataTree, options: Options, figure: Canvas | None) -> Canvas:
     draw_curve(force, tree, options)
     force.set_xlabel("")
     slope.plot(data["displacement"].values / x.size, values / scale.size, color="black")
-    slope.set_ylabel(scale.label("slope $F'$"))
-    slope.set_xlabel(x.label("displacement $X$"))
+    slope.set(ylabel=scale.label("slope $F'$"), xlabel=x.label("displacement $X$"))
     _mark_instability(slope, tree, x)
     if np.isfinite(spring):
         slope.axhline(
@@ -76,8 +75,7 @@ def draw_curve(axes: Axes, tree: DataTree, _: Options) -> None:
             markersize=4,
             label=f"instability at $X_c$ = {with_unit(tree.attrs['X_c'], 'm')}",
         )
-    axes.set_ylabel(force.label("force $F$"))
-    axes.set_xlabel(x.label("displacement $X$"))
+    axes.set(ylabel=force.label("force $F$"), xlabel=x.label("displacement $X$"))
     axes.set_xlim(0, data["displacement"].values[-1] / x.size)
     spring = config_of(tree).spring_stiffness
     stiffnesses = f"$K^*$ = {with_unit(tree.attrs['K_star'], 'N/m')}"
@@ -102,8 +100,7 @@ def draw_curves(axes: Axes, trees: Sequence[DataTree], labels: Sequence[str], _:
         if "X_c" in tree.attrs:
             point = tree.attrs["X_c"] / x.size, tree.attrs["F_c"] / force.size
             axes.plot(*point, "o", color=curve_color(number), markersize=4)
-    axes.set_ylabel(force.label("force $F$"))
-    axes.set_xlabel(x.label("displacement $X$; dots: $X_c$"))
+    axes.set(ylabel=force.label("force $F$"), xlabel=x.label("displacement $X$; dots: $X_c$"))
     axes.set_xlim(left=0)
 
 

@@ -25,8 +25,7 @@ def draw(tree: DataTree, options: Options, figure: Canvas | None) -> Canvas:
     velocity.plot(
         data["time"].values / time.size, data["velocity"].values / speed.size, color="black"
     )
-    velocity.set_ylabel(speed.label("velocity $V$"))
-    velocity.set_xlabel(time.label("time from the section"))
+    velocity.set(ylabel=speed.label("velocity $V$"), xlabel=time.label("time from the section"))
     return figure
 
 
@@ -37,8 +36,7 @@ def draw_forces(axes: Axes, tree: DataTree, _: Options) -> None:
     at = data["time"].values / time.size
     axes.plot(at, data["contact_force"].values / force.size, **CONTACT)
     axes.plot(at, data["spring_force"].values / force.size, **SPRING)
-    axes.set_ylabel(force.label("force"))
-    axes.set_xlabel(time.label("time from the section"))
+    axes.set(ylabel=force.label("force"), xlabel=time.label("time from the section"))
     titles(axes, tree, mathematical=_summary(tree), beside_legend=True)
     legend_above(axes)
 
@@ -54,8 +52,7 @@ def draw_cycles(axes: Axes, trees: Sequence[DataTree], labels: Sequence[str], _:
             **curve_style(number),
             label=label,
         )
-    axes.set_ylabel(force.label("spring force $F_d$"))
-    axes.set_xlabel(time.label("time from the section"))
+    axes.set(ylabel=force.label("spring force $F_d$"), xlabel=time.label("time from the section"))
 
 
 def _summary(tree: DataTree) -> str:

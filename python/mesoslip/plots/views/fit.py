@@ -64,9 +64,7 @@ def _draw_one(axes: Axes, tree: DataTree, after: str) -> None:
     axes.plot(
         observed["time"], observed / scale.size, color=MEASURED, linewidth=0.6, label="measured"
     )
-    axes.set_xlim(times[0], times[-1])
-    axes.set_xlabel("time (s)")
-    axes.set_ylabel(scale.label("spring force"))
+    axes.set(xlim=(times[0], times[-1]), xlabel="time (s)", ylabel=scale.label("spring force"))
     if is_narrow(axes.figure):
         legend_above(axes, columns=1)
         return

@@ -121,8 +121,7 @@ def _shape(axes: Axes, tree: DataTree, number: int) -> None:
     axes.fill_between(at, low, high, color=PREDICTED, alpha=0.35, linewidth=0)
     axes.plot(at, middle, color=PREDICTED)
     axes.plot(at, part["observed"].values * factor / scale.size, color=MEASURED)
-    axes.set_xlabel("time (periods of the setup)")
-    axes.set_ylabel(scale.label("mean along slips"))
+    axes.set(xlabel="time (periods of the setup)", ylabel=scale.label("mean along slips"))
 
 
 def draw_scores(axes: Axes, tree: DataTree, _: Options) -> None:

@@ -34,9 +34,7 @@ def draw_panel(axes: Axes, tree: Tree, options: Options) -> None:
             label=label,
         )
     axes.axhline(1, color="0.6", linewidth=0.8, zorder=0)
-    axes.set_yscale("log")
-    axes.set_xlabel("stress/strength at the start of the slips")
-    axes.set_ylabel("speed/c")
+    axes.set(yscale="log", xlabel="stress/strength at the start of the slips", ylabel="speed/c")
     titles(axes, tree)
 
 

@@ -115,8 +115,7 @@ def draw_fronts(axes: Axes, tree: Tree, picture: Picture, horizontal: Horizontal
                 bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.6},
             )
     axes.set_xlim(*shown(np.array(picture.window)))
-    axes.set_ylim(0, picture.length / scale.size)
-    axes.set_ylabel(scale.label("position, from the edge"))
+    axes.set(ylim=(0, picture.length / scale.size), ylabel=scale.label("position, from the edge"))
 
 
 def _draw_detached(axes: Axes, tree: Tree, picture: Picture, horizontal: HorizontalAxis) -> None:

@@ -35,8 +35,7 @@ def draw_panel(axes: Axes, tree: Tree, options: Options) -> None:
         )
     axes.set_xlim(0, picture.length / scale.size)
     axes.axhline(0, color="0.8", zorder=0)
-    axes.set_xlabel(scale.label("position, from the edge"))
-    axes.set_ylabel("stress/strength")
+    axes.set(xlabel=scale.label("position, from the edge"), ylabel="stress/strength")
     titles(axes, tree)
 
 

@@ -125,8 +125,7 @@ def movie(tree: DataTree, options: Options) -> Movie:
         values = values / scale.size
         (line,) = axes.plot(values[0], layers, ".-", color="black" if column else BLUE)
         margin = 0.05 * max(float(np.ptp(values)), 1e-12)
-        axes.set_xlim(values.min() - margin, values.max() + margin)
-        axes.set_ylim(0.5, layers[-1] + 0.5)
+        axes.set(xlim=(values.min() - margin, values.max() + margin), ylim=(0.5, layers[-1] + 0.5))
         axes.axvline(0, color="0.8", zorder=0)
         axes.set_xlabel(scale.label(f"{name} of the layer"))
         panels.append((line, values))

@@ -44,8 +44,7 @@ def draw_growth(axes: Axes, tree: DataTree, _: Options) -> None:
             label = rf"$\lambda$ = {with_error(exponent, error, '1/s')}"
             axes.semilogy(time[shown], line[shown], color="black", label=label)
             axes.legend()
-    axes.set_xlabel("time since the start of a twin (s)")
-    axes.set_ylabel("distance")
+    axes.set(xlabel="time since the start of a twin (s)", ylabel="distance")
     titles(axes, tree)
 
 

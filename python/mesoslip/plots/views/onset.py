@@ -121,7 +121,6 @@ class _Solution(NamedTuple):
 
 
 def _solutions(trees: Sequence[DataTree]) -> list[_Solution]:
-    """The solutions of outputs."""
     found = []
     for index, tree in enumerate(trees):
         static = config_of(tree).contacts.static_force

@@ -65,8 +65,7 @@ def _draw_residuals(axes: Axes, tree: DataTree) -> None:
     axes.fill_between(moved, *band, color=BLUE, alpha=0.35, linewidth=0)
     axes.plot(moved, force - middle, ".", color="black", markersize=1.5)
     axes.axhline(0, color="0.5", linewidth=0.6)
-    axes.set_xlabel(length.label("displacement of the load point"))
-    axes.set_ylabel(unit.label("residual"))
+    axes.set(xlabel=length.label("displacement of the load point"), ylabel=unit.label("residual"))
 
 
 VIEW = View(

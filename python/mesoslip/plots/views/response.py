@@ -108,8 +108,7 @@ def draw_healing(axes: Axes, data: Arrays) -> None:
         axes.plot(ends, (found.level + found.slope * np.log10(ends)) * scale, color=RED)
         slope = _slope(found, scale)
         write_title(axes, f"healing per decade of hold time = {slope}")
-    axes.set_xlabel("hold time (s)")
-    axes.set_ylabel("(peak - steady force) over $F_s$")
+    axes.set(xlabel="hold time (s)", ylabel="(peak - steady force) over $F_s$")
 
 
 def _slope(found: Line, scale: float) -> str:
@@ -127,10 +126,8 @@ def _scale(data: Arrays, name: str) -> float:
 
 
 def draw(tree: Tree, options: Options, figure: Canvas | None) -> Canvas:
-    """The record with the law that fits best; steady forces; healing in holds.
-
-    Measured traces, and sliders under a force, have pictures of their own.
-    """
+    """The record with the law that fits best, steady forces, healing; or a measured trace, or a
+    slider under a force."""
     experiment = Experiment(tree)
     if experiment.is_measured:
         return draw_measured(tree, experiment, figure)

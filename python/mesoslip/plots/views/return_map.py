@@ -43,8 +43,7 @@ def draw_map(axes: Axes, peaks: NDArray[np.float64]) -> None:
         axes.set(xlim=ends, ylim=ends, aspect="equal")
         axes.xaxis.set_major_locator(MaxNLocator(TICKS))
         axes.yaxis.set_major_locator(MaxNLocator(TICKS))
-    axes.set_xlabel(scale.label("peak"))
-    axes.set_ylabel(scale.label("next peak"))
+    axes.set(xlabel=scale.label("peak"), ylabel=scale.label("next peak"))
 
 
 VIEW = View(

@@ -38,8 +38,7 @@ def draw(tree: DataTree, options: Options, figure: Canvas | None) -> Canvas:
         stiffness.axhline(spring / scale.size, color=RED, linestyle="--", label=label)
     if np.any(np.isfinite(shown)):
         stiffness.set_yscale("log")
-    stiffness.set_ylabel(scale.label("stiffness"))
-    stiffness.set_xlabel(speed.label("velocity $v$"))
+    stiffness.set(ylabel=scale.label("stiffness"), xlabel=speed.label("velocity $v$"))
     for one in np.atleast_1d(tree.attrs.get("boundaries", [])):
         stiffness.axvline(one / speed.size, color=RED, linewidth=0.7, alpha=0.6, zorder=0)
     legend_above(stiffness)
@@ -63,8 +62,7 @@ def draw_force(axes: Axes, tree: DataTree, _: Options) -> None:
     if drive > 0:
         label = f"drive, {with_unit(drive, 'm/s')}"
         axes.axvline(drive / speed.size, color=BLUE, linestyle=":", label=label)
-    axes.set_xscale("log")
-    axes.set_ylabel(scale.label("steady force $F$"))
+    axes.set(xscale="log", ylabel=scale.label("steady force $F$"))
     axes.set_xlabel(speed.label("velocity $v$"))
     titles(axes, tree, beside_legend=True)
     legend_above(axes)

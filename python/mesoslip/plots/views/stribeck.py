@@ -52,8 +52,7 @@ def draw_curve(axes: Axes, found: Plateaus) -> None:
     axes.errorbar(x / along.size, y / up.size, error / up.size, **POINTS)
     if x.min() > 0 and x.max() > MIN_RATIO * x.min() and name != "start_time":
         axes.set_xscale("log")
-    axes.set_xlabel(along.label(title))
-    axes.set_ylabel(up.label(label))
+    axes.set(xlabel=along.label(title), ylabel=up.label(label))
 
 
 def draw_record(axes: Axes, tree: Tree, found: Plateaus) -> None:

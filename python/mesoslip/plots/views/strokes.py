@@ -72,8 +72,7 @@ def draw_loops(axes: Axes, found: Strokes) -> None:
         x = np.concatenate([place_of(record, one) for one in pairs[index]])
         y = np.concatenate([one.direction * along(record, one) for one in pairs[index]])
         axes.plot(x / place.size, y / scale.size, color=colour, linestyle="-", linewidth=0.7)
-    axes.set_xlabel(label)
-    axes.set_ylabel(scale.label(f"{name}, signed"))
+    axes.set(xlabel=label, ylabel=scale.label(f"{name}, signed"))
 
 
 def draw_cycles(axes: Axes, found: Strokes) -> None:
@@ -97,8 +96,7 @@ def draw_cycles(axes: Axes, found: Strokes) -> None:
             errors[shown] / scale.size,
             **(POINTS | {"color": colour, "label": DIRECTIONS[direction]}),
         )
-    axes.set_xlabel(found.records[0].singular)
-    axes.set_ylabel(scale.label(f"mean {name}"))
+    axes.set(xlabel=found.records[0].singular, ylabel=scale.label(f"mean {name}"))
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     if len(set(columns["direction"][known].tolist())) > 1:
         legend_above(axes)
@@ -119,8 +117,7 @@ def _draw_map(axes: Axes, found: Strokes, one: FrictionMap, limits: tuple[float,
         vmax=limits[1] / scale.size,
         rasterized=True,
     )
-    axes.set_xlabel(found.records[0].singular)
-    axes.set_ylabel(wrapped(label, axes_height(axes)))
+    axes.set(xlabel=found.records[0].singular, ylabel=wrapped(label, axes_height(axes)))
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.figure.colorbar(drawn, ax=axes, label=scale.label(name))
 

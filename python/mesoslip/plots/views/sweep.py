@@ -106,11 +106,8 @@ def _about_means(panels: list[Measured]) -> str:
 
 
 def draw_panel(axes: Axes, tree: DataTree, options: Options) -> None:
-    """Draw a measure of a sweep, the first one by default.
-
-    Over one key it is dots for realizations and a line for their mean; over two a map of the mean,
-    or of the most frequent one of a choice such as the regime.
-    """
+    """Draw a measure of a sweep, by default the first: dots and means over one key, a map of the
+    mean, or of the most frequent choice, over two."""
     data = tree.to_dataset()
     name = measures(data)[0] if options.measure is None else _known(data, options.measure)
     panel = _Panel.of(data, name)

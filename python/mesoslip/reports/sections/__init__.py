@@ -1,7 +1,4 @@
-"""The sections in the report of each kind of output, in their order.
-
-Adding one is adding its function to a file of this folder, and to the kinds of output that have it.
-"""
+"""The sections in the report of each kind of output, in their order."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Theory of each kind of contacts, in a file of its own and listed here.
-
-A kind without a theory is one that `ContactTheory` refuses to answer for.
-"""
+"""Theory of each kind of contacts, in a file of its own and listed here."""
 
 from __future__ import annotations
 

@@ -44,10 +44,7 @@ class _Ends(NamedTuple):
 
 
 class AgeingSliding(LinearStability):
-    """Steady sliding of contacts that age.
-
-    Parameters and errors are those of `LinearStability`.
-    """
+    """Steady sliding of contacts that age; see `LinearStability`."""
 
     @cached_property
     def _ends(self) -> _Ends:

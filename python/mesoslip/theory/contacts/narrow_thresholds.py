@@ -1,7 +1,4 @@
-"""Rate and state of activated contacts with thresholds that hardly differ, in closed form.
-
-All contacts break near one stretch. The derivation is in ``docs/temperature.md``.
-"""
+"""Rate and state of activated contacts near one threshold (``docs/temperature.md``)."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Holds and restarts of contacts that break by thermal activation, under a prescribed slider.
-
-The derivations are in ``docs/temperature.md``.
-"""
+"""Holds and restarts of activated contacts under a prescribed slider (``docs/temperature.md``)."""
 
 from __future__ import annotations
 
@@ -113,10 +110,8 @@ def restart(lives: ThermalLives, hold: float) -> Restart:
 def _slide_on(
     lives: ThermalLives, time: Array, share: Array, age: Array, stretch: Array
 ) -> tuple[Array, Array]:
-    """Force over F_s and number over N of contacts that continue to slide, at even times [s].
-
-    ``share`` is their number over N at first, ``age`` and ``stretch`` are theirs then.
-    """
+    """Force over F_s and number over N of contacts that continue to slide, at even times [s], from
+    their share, ages and stretches."""
     step = time[1] - time[0]
     hazard = np.zeros_like(share)
     before = lives.rate_at(age, stretch)

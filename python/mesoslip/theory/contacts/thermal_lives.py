@@ -141,11 +141,8 @@ class ThermalLives:
 
     @staticmethod
     def within(values: Complex, half: Array) -> Complex:
-        """∫ values dt from the start of the panel of each point.
-
-        The values have the shape (thresholds, panels, points), the half lengths of the panels
-        (thresholds, panels, 1).
-        """
+        """∫ values dt from the start of each point's panel, by values (thresholds, panels, points)
+        and half lengths (thresholds, panels, 1)."""
         return values @ cumulative().T * half
 
     def accumulated(self, values: Array) -> tuple[Array, Array]:

@@ -87,10 +87,8 @@ class ThermalResponse:
         return np.union1d(edges, young[young > self._begin])
 
     def _panel(self, start: float, end: float, hazard: Array) -> tuple[_Panel, Array, Array]:
-        """A panel, and ⟨S⟩ and ⟨S H⟩ at its points with their weights.
-
-        ``hazard`` is H at its start, shape (thresholds, 1).
-        """
+        """A panel, and ⟨S⟩ and ⟨S H⟩ at its points with their weights, by H at its start, shape
+        (thresholds, 1)."""
         lives = self.lives
         half = (end - start) / 2
         age, step = start + half * (1 + self._point), half * self._share
@@ -118,10 +116,8 @@ class ThermalResponse:
         return self.lives.rate_at(age[None, :], self.lives.back + self.lives.speed * age[None, :])
 
     def _cut(self, start: float, end: float, rows: NDArray[np.intp], hazard: Array) -> Array:
-        """S of contacts that reach their thresholds within a panel, shape (thresholds, points).
-
-        Weights at the points of the panel, with which polynomials are integrated to these ages.
-        """
+        """S of contacts that reach their thresholds within a panel, shape (thresholds, points), by
+        weights of an integral to these ages."""
         lives = self.lives
         half = (np.clip(lives.end, start, end) - start) / 2
         age = start + half * (1 + self._point)

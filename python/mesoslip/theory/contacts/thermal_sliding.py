@@ -70,10 +70,7 @@ class RateAndStateTheory(NamedTuple):
 
 
 class ThermalSliding(LinearStability):
-    """Steady sliding of contacts that break by thermal activation.
-
-    Parameters and errors are those of `LinearStability`.
-    """
+    """Steady sliding of contacts that break by thermal activation; see `LinearStability`."""
 
     lives_type: ClassVar[type[ThermalLives]] = ThermalLives
 

@@ -59,7 +59,6 @@ class Ageing(Table):
         return INFINITE_AGE if self.law == "relax" else 0.0
 
     def kernel_parameters(self) -> Parameters:
-        """Parameters of the law in the kernel."""
         return {
             "ageing": self.law,
             "ageing_time": self.time,

@@ -97,7 +97,6 @@ class Threshold(Table):
 
     @property
     def kernel_parameters(self) -> Parameters:
-        """Parameters of the law in the kernel."""
         cells = self.stretch_cells
         of_law = self.kind.kernel_parameters(self) if cells is None else cells.kernel_parameters
         return {"threshold_law": self.law, **of_law}

@@ -1,4 +1,7 @@
-"""Ctrl-C while the program starts, mostly in imports, ends it without a traceback."""
+"""Ctrl-C while the program starts: its end, without a traceback.
+
+Imports take most of the start, and what they raise when interrupted may be any exception.
+"""
 
 import os
 import signal

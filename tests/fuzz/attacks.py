@@ -223,7 +223,9 @@ def _other_command(
         found = differences(read(output), read(folder / "again.nc"))
         problems += [f"run again: {one} differs" for one in found]
     is_refused = printed.status in {1, 2} and command[0] in {"slips", "plot"}
-    if is_refused or (command[0] == "info" and printed.status not in {status, 130}):
+    # A run that this machine has no memory for is described, with a line that says so.
+    described = {status, 130} | ({0} if "the run may need" in printed.out + printed.err else set())
+    if is_refused or (command[0] == "info" and printed.status not in described):
         problems.append(f"{command[0]}: status {printed.status}: {printed.err[-300:]}")
     return problems
 

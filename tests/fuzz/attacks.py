@@ -296,7 +296,7 @@ def damaged(data: bytes, random: Random) -> bytes:
     elif what == "heap":
         # It has no checksum, and the library follows the sizes of its objects.
         where = data.find(b"GCOL") + random.randrange(1024)
-        changed[where] = random.randrange(256)
+        changed[where % len(data)] = random.randrange(256)
     elif what == "zeros":
         changed[place : place + length] = bytes(len(changed[place : place + length]))
     elif what == "cut":

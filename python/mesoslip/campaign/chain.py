@@ -5,9 +5,10 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator, Sequence
 
-from mesoslip.campaign.combination import Axis, Combination
+from mesoslip.campaign.combination import Axis
 from mesoslip.campaign.measures import Measure
 from mesoslip.campaign.sweep_table import SweepTable
+from mesoslip.configuration.config import Config
 from mesoslip.errors import Problem
 from mesoslip.simulation.start import CONTINUED
 
@@ -47,23 +48,19 @@ def with_directions(axes: Sequence[Axis], sweep: SweepTable) -> tuple[Axis, ...]
     return (*axes, Axis(DIRECTION, (DIRECTION,), rows))
 
 
-def unchained(combinations: Sequence[Combination], key: str, source: str) -> Iterator[Problem]:
-    """Why runs cannot start from the end of another."""
-    configs = [one.config for one in combinations]
-    if key == "slider.stiffness":
-        kind = next((one.slider.kind for one in configs if one.slider.oscillator is None), None)
-        if kind is not None:
-            message = f"slider.stiffness needs a slider of kind 'rigid', not {kind!r}"
-            yield Problem(source, "sweep.continue", message)
-    if any(one.pressing.varies for one in configs):
+def unchained(config: Config, key: str, source: str) -> Iterator[Problem]:
+    """Why a run cannot start from the end of another, or another from its end."""
+    if key == "slider.stiffness" and config.slider.oscillator is None:
+        message = f"slider.stiffness needs a slider of kind 'rigid', not {config.slider.kind!r}"
+        yield Problem(source, "sweep.continue", message)
+    if config.pressing.varies:
         message = "must be constant with sweep.continue: its stages start with a run"
         yield Problem(source, "load", message)
-    stops: dict[str, list[float | None]] = {
-        "run.avalanches": [one.run.avalanches for one in configs],
-        "run.stop.displacement": [one.run.stops.displacement for one in configs],
+    stops: dict[str, float | None] = {
+        "run.avalanches": config.run.avalanches,
+        "run.stop.displacement": config.run.stops.displacement,
     }
-    for name, values in stops.items():
-        value = next((one for one in values if one is not None), None)
+    for name, value in stops.items():
         if value is not None:
             message = (
                 "ends a run where no other can start; with sweep.continue a run ends with its "
@@ -72,31 +69,31 @@ def unchained(combinations: Sequence[Combination], key: str, source: str) -> Ite
             yield Problem(source, name, message, value)
 
 
-def chained(
-    combinations: Sequence[Combination], axes: Sequence[Axis], sweep: SweepTable
-) -> tuple[tuple[Combination, ...], ...]:
-    """Combinations in chains, each in the order of its runs."""
+def chained(axes: Sequence[Axis], sweep: SweepTable) -> Iterator[tuple[int, ...]]:
+    """Numbers of combinations in chains, each in the order of its runs."""
     along = next(at for at, axis in enumerate(axes) if axis.keys == (sweep.continue_,))
     values = [row[0] for row in axes[along].rows]
     ascending = sorted(range(len(values)), key=lambda number: values[number])
     rank = {number: at for at, number in enumerate(ascending)}
     within = {along, *(at for at, axis in enumerate(axes) if axis.dimension == DIRECTION)}
 
-    def others(one: Combination) -> tuple[int, ...]:
-        return tuple(number for at, number in enumerate(one.index) if at not in within)
+    indices = list(itertools.product(*(range(len(axis.rows)) for axis in axes)))
 
-    def order(one: Combination) -> tuple[int, int]:
-        at = one.index[along]
+    def others(one: int) -> tuple[int, ...]:
+        return tuple(number for at, number in enumerate(indices[one]) if at not in within)
+
+    def order(one: int) -> tuple[int, int]:
+        at = indices[one][along]
         match sweep.order:
             case "up":
                 return 0, rank[at]
             case "down":
                 return 0, -rank[at]
             case "up and down":
-                goes_down = one.index[-1]
+                goes_down = indices[one][-1]
                 return goes_down, -rank[at] if goes_down else rank[at]
             case _:
                 return 0, at
 
-    ordered = sorted(combinations, key=lambda one: (others(one), order(one)))
-    return tuple(tuple(chain) for _, chain in itertools.groupby(ordered, key=others))
+    ordered = sorted(range(len(indices)), key=lambda one: (others(one), order(one)))
+    return (tuple(chain) for _, chain in itertools.groupby(ordered, key=others))

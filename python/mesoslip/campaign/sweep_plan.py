@@ -6,17 +6,19 @@ realization of one combination.
 
 from __future__ import annotations
 
-import itertools
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from mesoslip.campaign.chain import DIRECTION, chain_problems, chained, unchained, with_directions
-from mesoslip.campaign.combination import Combination, described
+from mesoslip.campaign.combination import Value, described
+from mesoslip.campaign.point import combination_key
 from mesoslip.campaign.sweep_axes import axes_of
 from mesoslip.campaign.sweep_table import MAX_POINTS, SweepFile
 from mesoslip.campaign.user_measures import find_measures
@@ -26,13 +28,13 @@ from mesoslip.configuration.files import Change, Merged, on_base, override, read
 from mesoslip.configuration.messages import problems
 from mesoslip.configuration.reading import PathLike, as_path
 from mesoslip.errors import ConfigError, Problem
-from mesoslip.simulation.memory import free_memory
+from mesoslip.simulation.memory import free_memory, output_bytes
 
 # Maximum number of wrong combinations that are listed.
 MAX_REPORTED = 5
-# Combinations after which progress is reported, and memory that each takes [bytes].
+# Combinations after which progress is reported, and memory that each takes in a sweep [bytes].
 STEP = 1000
-COMBINATION_BYTES = 9e3
+COMBINATION_BYTES = 1.1e3
 
 
 class Plan:
@@ -91,18 +93,83 @@ class Plan:
         """Number of points: realizations of all combinations."""
         return math.prod(self.shape) * self.realizations
 
+    def index(self, combination: int) -> tuple[int, ...]:
+        """Where a combination is along each axis."""
+        return tuple(int(at) for at in np.unravel_index(combination, self.shape))
+
+    def values(self, combination: int) -> dict[str, Value]:
+        """The swept values of a combination, in SI, by key."""
+        return {
+            key: value
+            for axis, at in zip(self.axes, self.index(combination), strict=True)
+            for key, value in zip(axis.keys, axis.rows[at], strict=True)
+        }
+
+    def config(self, combination: int) -> Config:
+        """The configuration of a combination, made anew: 10⁶ of them would take 9 GB."""
+        changes = {**self.values(combination), "run.realizations": 1}
+        changes.pop(DIRECTION, None)
+        merged = override(Merged(self.tables), [changes])
+        return Config.from_dict(merged.tables, self._source)
+
+    @property
+    def keys(self) -> Sequence[str]:
+        """Hashes of everything that determines the measures of each combination; see `check`."""
+        return self._checked[0]
+
+    @property
+    def record_bytes(self) -> NDArray[np.float64]:
+        """Size of the record of each run [bytes]; see `check`."""
+        return self._checked[1]
+
     @cached_property
-    def combinations(self) -> tuple[Combination, ...]:
-        """All combinations, in the order of the dataset; a `ConfigError` says which are wrong."""
-        return self._checked(lambda _: None)
+    def _checked(self) -> tuple[Sequence[str], NDArray[np.float64]]:
+        return self._check(lambda _: None)
 
     def check(self, progress: Callable[[float], None]) -> None:
-        """Make all `combinations`, of which 10⁶ take minutes; see `run_sweep` for ``progress``."""
-        self.combinations = self._checked(progress)
+        """Check all combinations, of which 10⁶ take minutes; see `run_sweep` for ``progress``.
 
-    def _checked(self, progress: Callable[[float], None]) -> tuple[Combination, ...]:
-        combinations, found, wrong = [], list[Problem](), 0
+        A `ConfigError` says which are wrong.
+        """
+        self._checked = self._check(progress)
+
+    def _check(
+        self, progress: Callable[[float], None]
+    ) -> tuple[Sequence[str], NDArray[np.float64]]:
         count = math.prod(self.shape)
+        self._check_memory(count)
+        found, wrong = list[Problem](), 0
+        unchainable: dict[str, Problem] = {}
+        keys, sizes = list[str](), np.empty(count)
+        for number in range(count):
+            if number % STEP == 0:
+                progress(number / count)
+            try:
+                config = self.config(number)
+            except ConfigError as error:
+                wrong += 1
+                if wrong <= MAX_REPORTED:
+                    source = f"{self._source}: point {described(self.values(number))}"
+                    found += [
+                        Problem(source, one.key, one.message, one.value) for one in error.problems
+                    ]
+                continue
+            if self.sweep.continue_ is not None:
+                for one in unchained(config, self.sweep.continue_, self._source):
+                    unchainable.setdefault(one.key, one)
+            keys.append(combination_key(config, self.measures, self.sweep.discard))
+            # By default only kept outputs have finer traces of slips.
+            has_finer = self.sweep.traces or config.output.slip_interval is not None
+            sizes[number] = output_bytes(config, has_finer=has_finer)
+        if wrong > MAX_REPORTED:
+            message = f"{wrong} of {count} combinations are wrong"
+            found.append(Problem(self._source, "sweep", message))
+        if found or unchainable:
+            raise ConfigError(found or list(unchainable.values()))
+        return keys, sizes
+
+    def _check_memory(self, count: int) -> None:
+        """Refuse a sweep whose combinations alone take more than the free memory."""
         needed, free = COMBINATION_BYTES * count, free_memory()
         if needed > free:
             message = (
@@ -110,45 +177,15 @@ class Plan:
                 f"and {free / 2**30:.3g} GiB are free; sweep them in parts"
             )
             raise ConfigError([Problem(self._source, "sweep", message)])
-        for number, index in enumerate(itertools.product(*map(range, self.shape))):
-            if number % STEP == 0:
-                progress(number / count)
-            values = {
-                key: value
-                for axis, at in zip(self.axes, index, strict=True)
-                for key, value in zip(axis.keys, axis.rows[at], strict=True)
-            }
-            changes = {**values, "run.realizations": 1}
-            changes.pop(DIRECTION, None)
-            try:
-                config = Config.from_dict(
-                    override(Merged(self.tables), [changes]).tables, self._source
-                )
-            except ConfigError as error:
-                wrong += 1
-                if wrong <= MAX_REPORTED:
-                    source = f"{self._source}: point {described(values)}"
-                    found += [
-                        Problem(source, one.key, one.message, one.value) for one in error.problems
-                    ]
-                continue
-            combinations.append(Combination(index, values, config))
-        if wrong > MAX_REPORTED:
-            message = f"{wrong} of {count} combinations are wrong"
-            found.append(Problem(self._source, "sweep", message))
-        if self.sweep.continue_ is not None and not found:
-            found += unchained(combinations, self.sweep.continue_, self._source)
-        if found:
-            raise ConfigError(found)
-        return tuple(combinations)
 
-    @cached_property
-    def chains(self) -> tuple[tuple[Combination, ...], ...]:
-        """The combinations in chains, of which each run starts from the end of the one before; one
-        a chain without `sweep.continue`."""
+    def chains(self) -> Iterator[tuple[int, ...]]:
+        """The combinations in chains, each run of which starts from the end of the one before.
+
+        Without `sweep.continue` each combination is a chain of its own.
+        """
         if self.sweep.continue_ is None:
-            return tuple((one,) for one in self.combinations)
-        return chained(self.combinations, self.axes, self.sweep)
+            return ((one,) for one in range(math.prod(self.shape)))
+        return chained(self.axes, self.sweep)
 
 
 def as_plan(plan: PathLike | Mapping[str, Any] | Plan) -> Plan:

@@ -54,6 +54,13 @@ def trace(
     decimal: Annotated[
         str | None, typer.Option(help="Decimal sign, if the file allows two", metavar="','")
     ] = None,
+    dates: Annotated[
+        str | None,
+        typer.Option(
+            help="Order of day, month, year in dates such as 04/03/2026: dmy, mdy, ymd",
+            metavar="ORDER",
+        ),
+    ] = None,
     sheet: Annotated[
         str | None,
         typer.Option(
@@ -144,6 +151,7 @@ def trace(
         "config": config,
         "headers": columns,
         "decimal": decimal,
+        "dates": dates,
         "sheet": sheet,
         "rate": rate,
         "velocity": velocity,

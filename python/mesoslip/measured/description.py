@@ -17,6 +17,7 @@ from mesoslip.configuration.messages import problems
 from mesoslip.configuration.table import Table, Text, Whole, problem
 from mesoslip.configuration.units import is_number, number_of, text_to_si, to_si
 from mesoslip.errors import ConfigError, Problem, shown
+from mesoslip.measured.reading.stamps import Order
 
 # Maximum size of a quantity in SI, so that derived quantities do not overflow.
 MAX_SIZE = 1e30
@@ -171,6 +172,9 @@ class TraceDescription(Table):
     """Headers instead of those of the file, such as "time [s], force [uN], -"."""
     decimal: Literal[".", ","] | None = None
     """Decimal sign; by default found from the numbers, if they allow one only."""
+    dates: Order | None = None
+    """Order of day, month and year in dates such as 04/03/2026; by default the one in which times
+    increase."""
     sheet: Text | None = None
     """Sheet of a workbook (.xlsx); by default the one with the most numbers."""
     rate: Rate | None = None

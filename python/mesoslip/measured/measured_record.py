@@ -178,7 +178,13 @@ def _read(path: Path, trace: TraceDescription) -> Table:
     rate = trace.si("rate")
     has_headers = trace.headers is not None or bool(trace.columns.model_fields_set)
     read: Callable[..., Any] = read_file if rate is None else blocks_of
-    found = read(path, decimal=trace.decimal, sheet=trace.sheet, has_headers=has_headers)
+    found = read(
+        path,
+        decimal=trace.decimal,
+        dates=trace.dates,
+        sheet=trace.sheet,
+        has_headers=has_headers,
+    )
     if rate is not None:
         found = thinned(found, rate, lambda one: assign(one, trace.columns, trace.headers))
     table: Table = found

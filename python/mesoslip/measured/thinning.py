@@ -87,7 +87,7 @@ def _joined(tables: list[Table], *notes: str) -> Table:
         values=np.hstack([one.values for one in tables]),
         lines=np.concatenate([one.lines for one in tables]),
         bad=bad,
-        notes=[*tables[0].notes, *notes],
+        notes=[*dict.fromkeys(note for one in tables for note in one.notes), *notes],
     )
 
 

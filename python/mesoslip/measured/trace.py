@@ -162,6 +162,7 @@ def read_trace(
     *,
     columns: str | None = None,
     decimal: str | None = None,
+    dates: str | None = None,
     sheet: str | None = None,
     rate: str | float | None = None,
     velocity: str | float | None = None,
@@ -196,6 +197,8 @@ def read_trace(
         Headers instead of those of the file, such as "time [s], force [uN], -".
     decimal
         Decimal sign, "." or ",", if the file allows both.
+    dates
+        Order of day, month and year in dates such as 04/03/2026: "dmy", "mdy" or "ymd".
     sheet
         Sheet of a workbook (.xlsx); by default the one with the most numbers.
     rate
@@ -263,6 +266,7 @@ def read_trace(
             config=config,
             headers=columns,
             decimal=decimal,
+            dates=dates,
             sheet=sheet,
             rate=rate,
             velocity=velocity,

@@ -17,12 +17,12 @@ from mesoslip.measured.headers import BRACKETS, read_header
 from mesoslip.measured.reading.cells import (
     COMMENT,
     DELIMITERS,
-    STAMP_FORM,
     is_missing,
     is_number,
     may_group,
     split,
 )
+from mesoslip.measured.reading.stamps import STAMP_FORM
 from mesoslip.measured.units import is_unit
 
 # Number of lines from which the layout is found.

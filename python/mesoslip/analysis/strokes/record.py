@@ -43,8 +43,15 @@ class StrokeRecord:
 
     @cached_property
     def sign(self) -> float:
-        """+1 if the force is positive along the motion, -1 if it is against it."""
-        return polarity(self.force, self.pieces)
+        """+1 if the force is positive along the motion, -1 if it is against it.
+
+        Along the motion loops lose energy; without a position the force in the pieces decides.
+        """
+        whole = self.pieces[1:-1]
+        if self.position is None or len(whole) < 2:
+            return polarity(self.force, self.pieces)
+        cycles = slice(whole[0].first, whole[2 * (len(whole) // 2) - 1].after)
+        return -1.0 if loop_area(self.position[cycles], self.force[cycles]) < 0 else 1.0
 
     @cached_property
     def position_noise(self) -> float:
@@ -131,6 +138,12 @@ def record_in(
     kept = tuple(one._replace(after=min(one.after, count)) for one in pieces if one.first < count)
     noise_of = (white, correlated, correlation_time)
     return StrokeRecord(time, force, position, normal, kept, source, *noise_of, noun, remarks)
+
+
+def loop_area(x: Array, force: Array) -> float:
+    """Integral of force dx around a polygon of samples."""
+    force = force - force.mean()
+    return float(0.5 * (force + np.roll(force, -1)) @ (np.roll(x, -1) - x))
 
 
 def _whole(time: Array, values: Array) -> Array:

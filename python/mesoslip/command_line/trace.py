@@ -61,6 +61,14 @@ def trace(
             metavar="ORDER",
         ),
     ] = None,
+    missing: Annotated[
+        str | None,
+        typer.Option(
+            help="Numbers that stand for missing ones, or none; those such as -9999 that lie far "
+            "from all others by default",
+            metavar="NUMBERS",
+        ),
+    ] = None,
     sheet: Annotated[
         str | None,
         typer.Option(
@@ -90,6 +98,13 @@ def trace(
         typer.Option(
             help="Whether the drive goes back and forth: strokes, one-way; found by default",
             metavar="MOTION",
+        ),
+    ] = None,
+    force_direction: Annotated[
+        str | None,
+        typer.Option(
+            help="Direction of the force in strokes: along, against the motion; found by default",
+            metavar="DIRECTION",
         ),
     ] = None,
     normal_force: Annotated[
@@ -152,6 +167,7 @@ def trace(
         "headers": columns,
         "decimal": decimal,
         "dates": dates,
+        "missing": missing,
         "sheet": sheet,
         "rate": rate,
         "velocity": velocity,
@@ -159,6 +175,7 @@ def trace(
         "radius": radius,
         "viscosity": viscosity,
         "motion": motion,
+        "force_direction": force_direction,
         "normal_force": normal_force,
         "normal_stress": normal_stress,
         "area": area,

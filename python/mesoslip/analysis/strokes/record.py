@@ -9,13 +9,16 @@ from functools import cached_property
 import numpy as np
 
 from mesoslip.analysis.noise import noise_level, without_impulses
-from mesoslip.analysis.strokes.segments import FORCE, POSITIONS, Piece, output_pieces
+from mesoslip.analysis.strokes.segments import FORCE, POSITIONS, Piece, given_in, output_pieces
 from mesoslip.analysis.strokes.sliding import polarity
 from mesoslip.array_types import Array
 from mesoslip.errors import FileError
 from mesoslip.output.access import group_of
 from mesoslip.output.arrays import Tree
 from mesoslip.output.variables import force_among
+
+# Direction of the force that is given.
+AGAINST = "against"
 
 
 @dataclass(frozen=True)
@@ -40,6 +43,8 @@ class StrokeRecord:
     """What the pieces are."""
     remarks: tuple[str, ...] = ()
     """Sentences on the pieces."""
+    direction: str | None = None
+    """Direction of the force, `AGAINST` or along the motion, if it is given."""
 
     @cached_property
     def sign(self) -> float:
@@ -47,6 +52,8 @@ class StrokeRecord:
 
         Along the motion loops lose energy; without a position the force in the pieces decides.
         """
+        if self.direction is not None:
+            return -1.0 if self.direction == AGAINST else 1.0
         whole = self.pieces[1:-1]
         if self.position is None or len(whole) < 2:
             return polarity(self.force, self.pieces)
@@ -85,10 +92,14 @@ class StrokeRecord:
         found = list(self.remarks)
         if self.source == FORCE:
             found.append(
-                "guess: strokes are those of the sign of the force, as no displacement is known"
+                "guess: strokes are those of the sign of the force, as no displacement is known "
+                "(trace --motion)"
             )
-        elif self.sign < 0:
-            found.append("guess: the force is against the motion, as of the drive on the sensor")
+        elif self.sign < 0 and self.direction is None:
+            found.append(
+                "guess: the force is against the motion, as of the drive on the sensor "
+                "(trace --force-direction)"
+            )
         return found
 
 
@@ -137,7 +148,10 @@ def record_in(
         )
     kept = tuple(one._replace(after=min(one.after, count)) for one in pieces if one.first < count)
     noise_of = (white, correlated, correlation_time)
-    return StrokeRecord(time, force, position, normal, kept, source, *noise_of, noun, remarks)
+    direction = given_in(tree, "force_direction")
+    return StrokeRecord(
+        time, force, position, normal, kept, source, *noise_of, noun, remarks, direction
+    )
 
 
 def loop_area(x: Array, force: Array) -> float:

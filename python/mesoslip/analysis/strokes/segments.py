@@ -101,8 +101,14 @@ def output_pieces(tree: Tree, realization: int = 0) -> tuple[tuple[Piece, ...] |
     )
     # Forces are missing after the end of an interrupted run only.
     known = np.isfinite(force)
-    motion = tomllib.loads(tree.attrs.get("trace", "")).get("trace", {}).get("motion")
+    motion = given_in(tree, "motion")
     return record_pieces(root["time"].values[known], force[known], drive, displacement, motion)
+
+
+def given_in(tree: Tree, key: str) -> str | None:
+    """A key of the description of a measured trace; None if it was not given."""
+    value: str | None = tomllib.loads(tree.attrs.get("trace", "")).get("trace", {}).get(key)
+    return value
 
 
 def back_and_forth(count: int, name: str) -> str:

@@ -360,7 +360,9 @@ def _same_clock(one: Array, other: Array) -> bool:
     known = np.isfinite(one) & np.isfinite(other)
     if np.count_nonzero(known) < 2:
         return False
-    step = max(float(np.median(np.abs(np.diff(row[known])))) for row in (one, other))
+    steps = [np.abs(np.diff(row[known])) for row in (one, other)]
+    # Rounded times are equal in several rows.
+    step = max(float(np.median(row[row > 0])) if row.any() else 0.0 for row in steps)
     return float(np.ptp(one[known] - other[known])) <= 2 * step
 
 

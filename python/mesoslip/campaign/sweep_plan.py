@@ -1,24 +1,20 @@
-"""A sweep, checked: a configuration that is varied along axes.
-
-Axes multiply, and each combination is run for a number of realizations. A *point* is one
-realization of one combination.
-"""
+"""A sweep, checked: a configuration varied along axes, in chains of runs that follow each other."""
 
 from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
 
-from mesoslip.campaign.chain import DIRECTION, chain_problems, chained, unchained, with_directions
-from mesoslip.campaign.combination import Combination, described
+from mesoslip.campaign.combination import Axis, Combination, described
+from mesoslip.campaign.measures import Measure
 from mesoslip.campaign.sweep_axes import axes_of
-from mesoslip.campaign.sweep_table import MAX_POINTS, SweepFile
+from mesoslip.campaign.sweep_table import MAX_POINTS, SweepFile, SweepTable
 from mesoslip.campaign.user_measures import find_measures
 from mesoslip.configuration.config import Config
 from mesoslip.configuration.differences import check_changes
@@ -27,6 +23,98 @@ from mesoslip.configuration.messages import problems
 from mesoslip.configuration.reading import PathLike, as_path
 from mesoslip.errors import ConfigError, Problem
 from mesoslip.simulation.memory import free_memory
+from mesoslip.simulation.start import CONTINUED
+
+# Dimension of the order of a chain that goes up and down again, and its values.
+DIRECTION = "direction"
+DIRECTIONS = ("up", "down")
+BOTH = "up and down"
+
+
+def chain_problems(
+    sweep: SweepTable, axes: Sequence[Axis], measures: Sequence[Measure], source: str
+) -> Iterator[Problem]:
+    """Errors of `sweep.continue` that show before any run."""
+    key = sweep.continue_
+    if key not in CONTINUED:
+        message = (
+            f"must be one of {', '.join(CONTINUED)}: with any other key the contacts of the last "
+            "run are not contacts of the next one"
+        )
+        yield Problem(source, "sweep.continue", message, key)
+    elif all(axis.keys != (key,) for axis in axes):
+        yield Problem(source, "sweep.continue", "needs values in [sweep.grid]", key)
+    for one in measures:
+        if one.runs_again:
+            message = (
+                f"{one.name} is measured in another run, which starts as contacts.initial says; "
+                "leave it out with sweep.continue"
+            )
+            yield Problem(source, "sweep.measures", message)
+
+
+def with_directions(axes: Sequence[Axis], sweep: SweepTable) -> tuple[Axis, ...]:
+    """The axes of a sweep, with that of the direction last where it goes up and down."""
+    if sweep.order != BOTH:
+        return tuple(axes)
+    rows = tuple((one,) for one in DIRECTIONS)
+    return (*axes, Axis(DIRECTION, (DIRECTION,), rows))
+
+
+def unchained(combinations: Sequence[Combination], key: str, source: str) -> Iterator[Problem]:
+    """Why runs cannot start from the end of another."""
+    configs = [one.config for one in combinations]
+    if key == "slider.stiffness":
+        kind = next((one.slider.kind for one in configs if one.slider.oscillator is None), None)
+        if kind is not None:
+            message = f"slider.stiffness needs a slider of kind 'rigid', not {kind!r}"
+            yield Problem(source, "sweep.continue", message)
+    if any(one.pressing.varies for one in configs):
+        message = "must be constant with sweep.continue: its stages start with a run"
+        yield Problem(source, "load", message)
+    stops: dict[str, list[float | None]] = {
+        "run.avalanches": [one.run.avalanches for one in configs],
+        "run.stop.displacement": [one.run.stops.displacement for one in configs],
+    }
+    for name, values in stops.items():
+        value = next((one for one in values if one is not None), None)
+        if value is not None:
+            message = (
+                "ends a run where no other can start; with sweep.continue a run ends with its "
+                "duration, run.stop.slips or run.stop.steady"
+            )
+            yield Problem(source, name, message, value)
+
+
+def chained(
+    combinations: Sequence[Combination], axes: Sequence[Axis], sweep: SweepTable
+) -> tuple[tuple[Combination, ...], ...]:
+    """Combinations in chains, each in the order of its runs."""
+    along = next(at for at, axis in enumerate(axes) if axis.keys == (sweep.continue_,))
+    values = [row[0] for row in axes[along].rows]
+    ascending = sorted(range(len(values)), key=lambda number: values[number])
+    rank = {number: at for at, number in enumerate(ascending)}
+    within = {along, *(at for at, axis in enumerate(axes) if axis.dimension == DIRECTION)}
+
+    def others(one: Combination) -> tuple[int, ...]:
+        return tuple(number for at, number in enumerate(one.index) if at not in within)
+
+    def order(one: Combination) -> tuple[int, int]:
+        at = one.index[along]
+        match sweep.order:
+            case "up":
+                return 0, rank[at]
+            case "down":
+                return 0, -rank[at]
+            case "up and down":
+                goes_down = one.index[-1]
+                return goes_down, -rank[at] if goes_down else rank[at]
+            case _:
+                return 0, at
+
+    ordered = sorted(combinations, key=lambda one: (others(one), order(one)))
+    return tuple(tuple(chain) for _, chain in itertools.groupby(ordered, key=others))
+
 
 # Maximum number of wrong combinations that are listed.
 MAX_REPORTED = 5

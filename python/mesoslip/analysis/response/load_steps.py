@@ -15,7 +15,7 @@ import numpy as np
 
 from mesoslip.analysis.experiment_stages import Experiment, Stage
 from mesoslip.analysis.response.columns import LOAD_STEPS, empty_row
-from mesoslip.analysis.response.decay import decay
+from mesoslip.analysis.response.line import decay
 from mesoslip.analysis.steady_force import error_of_mean, steady_mean
 from mesoslip.array_types import Array
 

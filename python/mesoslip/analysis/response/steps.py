@@ -9,7 +9,7 @@ import numpy as np
 
 from mesoslip.analysis.experiment_stages import Experiment, Peak, Stage
 from mesoslip.analysis.response.columns import STEPS, empty_row
-from mesoslip.analysis.response.decay import decay
+from mesoslip.analysis.response.line import decay
 from mesoslip.analysis.steady_force import SteadyMean, error_of_mean
 from mesoslip.quantities import with_unit
 

@@ -1,15 +1,18 @@
-"""Ctrl-C while the program starts, mostly in imports, ends it without a traceback."""
+"""Ctrl-C while the program starts: its end, without a traceback.
 
+Imports take most of the start, and what they raise when interrupted may be any exception. So this
+module imports only what the interpreter has at its start; ``signal`` needs ``enum`` and others.
+"""
+
+import _signal as signal  # type: ignore[import-not-found]
 import os
-import signal
-from typing import Any
 
 __all__ = ["INTERRUPTED", "catches_interrupts", "is_interrupt"]
 
 INTERRUPTED = 128 + signal.SIGINT
 
 
-def _leave(*_: Any) -> None:
+def _leave(*_: object) -> None:
     os._exit(INTERRUPTED)
 
 

@@ -203,6 +203,9 @@ class Command:
         prepare: Callable[[], None] = lambda: None,
     ) -> None:
         self._paths = folder.parent / "stdout", folder.parent / "stderr"
+        # Here, as the command may be killed before it opens them.
+        for path in self._paths:
+            path.write_bytes(b"")
         self.pid = os.fork()
         if self.pid == 0:
             try:

@@ -600,6 +600,14 @@ runpy.run_module("mesoslip", run_name="__main__")
     assert (done.returncode, done.stdout, done.stderr) == (130, b"", b"")
 
 
+def test_nothing_is_imported_before_interrupts_are_caught():
+    code = "import sys; sys.argv = ['/usr/bin/mesoslip']; import mesoslip"
+    line = [sys.executable, "-I", "-X", "importtime", "-c", code]
+    done = subprocess.run(line, check=True, capture_output=True, text=True)
+    names = [one.rpartition("|")[2].strip() for one in done.stderr.splitlines()]
+    assert names[names.index("site") + 1] == "mesoslip._start"
+
+
 def test_an_interrupt_behind_another_error_ends_the_program(monkeypatch):
     """Such as in the names of a class, where Python raises an error of its own."""
 

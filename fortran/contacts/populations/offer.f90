@@ -278,7 +278,7 @@ contains
       end associate
    end subroutine add_changes
 
-   !> Whether a slider that can come to rest within a distance [m] is in balance except for rounding
+   !> Whether a slider that can stop within a distance [m] is in balance except for rounding
    !> errors: these must not decide in which direction contacts break.
    pure function is_in_balance(self, pose, slack) result(is_balanced)
       class(population_state_type), intent(in) :: self

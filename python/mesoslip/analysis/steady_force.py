@@ -1,4 +1,8 @@
-"""Means of correlated series after a transient, with errors (``docs/response.md``)."""
+"""Means of correlated series after a transient, with standard errors.
+
+The coverage of the errors was measured: see ``docs/response.md``, and
+``tests/studies/response_coverage.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""A point: one realization of one combination, identical wherever it is computed."""
+"""A point: one realization of one combination, identical wherever it is computed.
+
+Points of a chain are computed together, as each starts from the end of the one before.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Tables of numbers under headers with units, such as ``time [s]``, read strictly."""
+"""Tables with units: columns of numbers under headers such as ``time [s]``, read strictly.
+
+Ambiguous numbers are refused; the message names the line and the fix.
+"""
 
 from __future__ import annotations
 

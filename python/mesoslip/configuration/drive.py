@@ -1,4 +1,8 @@
-"""The drive: its tables in a file, and its parts of constant acceleration for the kernel."""
+"""The drive: its tables in a file, and its parts of constant acceleration for the kernel.
+
+Every drive is a sequence of parts, in each of which the velocity changes linearly with time. Each
+part has the number of its stage.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,8 @@
-"""Kinds of outputs, one for each command."""
+"""Kinds of outputs, one for each command.
+
+A new kind needs a line here, a default view of the same name in `mesoslip.plots.views`, and its
+sections in `mesoslip.reports.sections`.
+"""
 
 from __future__ import annotations
 

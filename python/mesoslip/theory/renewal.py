@@ -1,4 +1,7 @@
-"""The renewal equation of slow forward sliding, whose solution becomes polynomials of panels."""
+"""The renewal equation of slow forward sliding, solved by collocation on panels of equal width.
+
+The solver is ``fortran/theory/renewal.f90``; here its values become polynomials.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Quantities from a slider's keys alone, in a form for each kind, by the type of its table."""
+"""Quantities from a slider's keys alone: its dynamic stiffness, and others in closed form.
+
+Each function has a form for each kind of slider, chosen by the type of its table.
+"""
 
 from __future__ import annotations
 

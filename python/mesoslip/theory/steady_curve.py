@@ -1,4 +1,7 @@
-"""Steady sliding over velocity: F(v), dF/d ln v, and the springs with which it is stable."""
+"""Steady sliding over velocity: F(v), dF/d ln v, and the springs with which it is stable.
+
+For contacts that age or break by thermal activation, whose force depends on how fast they slide.
+"""
 
 from __future__ import annotations
 

@@ -129,7 +129,7 @@ def motion_under_force(experiment: Experiment) -> tuple[str, bool]:
     """The motion in the last stage of a drive by force, as a sentence, and whether it is steady
     creep. A run under way may be in its first stage still."""
     if not experiment.stages:
-        return "has not come to the end of a stage yet", False
+        return "has not reached the end of a stage yet", False
     stage = experiment.stages[-1]
     constant = [row for row in creep_rows(experiment, 0) if row["stage_number"] == stage.number]
     growing = [row for row in ramp_rows(experiment, 0) if row["stage_number"] == stage.number]

@@ -1,4 +1,7 @@
-"""Kinds of contacts, each in a file of its own and listed here."""
+"""Kinds of contacts, each in a file of its own and listed here.
+
+Adding a kind is adding a file with a `ContactKind` and naming it in `KINDS`.
+"""
 
 from __future__ import annotations
 

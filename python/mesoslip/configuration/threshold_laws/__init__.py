@@ -1,4 +1,8 @@
-"""Threshold laws: a file each, with its `ThresholdLawKind` in the variable ``LAW``."""
+"""Threshold laws: a file each, with its `ThresholdLawKind` in the variable ``LAW``.
+
+Adding one is adding a file to this folder and its name to the build, and the same in the kernels
+(`fortran/contacts/threshold_laws`).
+"""
 
 from __future__ import annotations
 

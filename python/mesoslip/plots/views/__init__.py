@@ -1,4 +1,7 @@
-"""The views: a file each, with its `View` in the variable ``VIEW``."""
+"""The views: a file each, with its `View` in the variable ``VIEW``.
+
+Adding one is adding a file to this folder, and its name to the build.
+"""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ def draw_panel(axes: Axes, tree: Tree, options: Options) -> None:
     picture = picture_of(tree, options)
     times, config = times_of(tree), config_of(tree)
     low = int(np.searchsorted(times, picture.window[0], "right") - 1)
-    # Blocks have come to rest some half periods of the setup after an event.
+    # Blocks are at rest some half periods of the setup after an event.
     end = picture.window[1] + (3 * config.slider.quiet_time if options.extent.is_whole else 0.0)
     high = min(int(np.searchsorted(times, end)), times.size - 1)
     force = group_of(tree, "blocks")["block_contact_force"].isel(realization=picture.realization)

@@ -1,4 +1,7 @@
-"""The sections in the report of each kind of output, in their order."""
+"""The sections in the report of each kind of output, in their order.
+
+Adding one is adding its function to a file of this folder, and to the kinds of output that have it.
+"""
 
 from __future__ import annotations
 

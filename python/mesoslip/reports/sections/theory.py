@@ -1,4 +1,7 @@
-"""Numbers of force curves, onsets, cycles and Lyapunov exponents, with theory imported late."""
+"""Derived numbers of force curves, onsets of slip, settled cycles and Lyapunov exponents.
+
+The theory is imported where it is used: a report of a run has none.
+"""
 
 from __future__ import annotations
 

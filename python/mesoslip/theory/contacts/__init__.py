@@ -1,4 +1,7 @@
-"""Theory of each kind of contacts, in a file of its own and listed here."""
+"""Theory of each kind of contacts, in a file of its own and listed here.
+
+A kind without a theory is one that `ContactTheory` refuses to answer for.
+"""
 
 from __future__ import annotations
 

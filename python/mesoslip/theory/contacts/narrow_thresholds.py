@@ -1,4 +1,7 @@
-"""Rate and state of activated contacts near one threshold (``docs/temperature.md``)."""
+"""Rate and state of activated contacts with thresholds that hardly differ, in closed form.
+
+All contacts break near one stretch. The derivation is in ``docs/temperature.md``.
+"""
 
 from __future__ import annotations
 

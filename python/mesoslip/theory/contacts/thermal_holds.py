@@ -1,4 +1,7 @@
-"""Holds and restarts of activated contacts under a prescribed slider (``docs/temperature.md``)."""
+"""Holds and restarts of contacts that break by thermal activation, under a prescribed slider.
+
+The derivations are in ``docs/temperature.md``.
+"""
 
 from __future__ import annotations
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from conftest import long
+from mesoslip.simulation.audit import step_errors
 from mesoslip.simulation.realization import Realization
-from mesoslip.simulation.step_errors import step_errors
 from mesoslip.theory.force_curve import ForceCurve
 from oracles import frozen_law, stationary_force
 from states import entries, reals, saved

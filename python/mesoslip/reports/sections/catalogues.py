@@ -20,7 +20,7 @@ from mesoslip.analysis.slips import (
 from mesoslip.analysis.strokes import has_rotation, output_pieces, strokes_of
 from mesoslip.errors import FileError
 from mesoslip.output.access import group_of
-from mesoslip.plots.lines import max_size
+from mesoslip.plots.extent import max_size
 from mesoslip.plots.style import curve_color
 from mesoslip.quantities import column, scale_for
 from mesoslip.reports.content import Block, Section, Subject, Table, Text, drawn

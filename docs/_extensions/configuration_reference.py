@@ -10,7 +10,7 @@ from typing import Any, Literal, get_args, get_origin
 import annotated_types
 from mesoslip.campaign.sweep_table import SweepTable
 from mesoslip.configuration.config import Config
-from mesoslip.configuration.meanings import meanings
+from mesoslip.configuration.keys import meanings
 from mesoslip.configuration.messages import tables_in
 from mesoslip.configuration.sliders import SLIDERS
 from mesoslip.configuration.table import Table

@@ -113,6 +113,13 @@ def klein():
     return configure
 
 
+def at_end(one: Any, advances: int | None = None) -> Any:
+    """A realization, advanced to its end in segments of a number of advances."""
+    while not one.finished:
+        one.advance(advances)
+    return one
+
+
 @pytest.fixture
 def few_replicas(monkeypatch):
     """Fits of avalanche sizes with few synthetic samples, where their goodness does not matter."""

@@ -9,7 +9,7 @@ import math
 import mesoslip
 import numpy as np
 import pytest
-from conftest import ROOT, long
+from conftest import ROOT, at_end, long
 from kinds import KINDS, configuration, pairwise
 from mesoslip import Config, ConfigError
 from mesoslip.output.tree import build_tree
@@ -634,8 +634,7 @@ def test_a_rigid_slider_hardly_stops_where_nothing_happens(klein, changes):
         **changes,
     )
     with Realization(config, 0) as realization:
-        while not realization.finished:
-            realization.advance()
+        at_end(realization)
         assert realization.breaks > 5000
         assert realization.advances < 2.2 * realization.breaks
 
@@ -653,7 +652,6 @@ def test_few_contacts_break_very_often(count):
         ),
         0,
     )
-    while not run.finished:
-        run.advance()
+    at_end(run)
     assert run.breaks > 400 * count
     assert abs(run.energy_residual) < 1e-12

@@ -7,7 +7,7 @@ import dataclasses
 import mesoslip
 import numpy as np
 import pytest
-from conftest import klein_tables
+from conftest import at_end, klein_tables
 from kinds import KINDS, configuration
 from mesoslip import Config, ConfigError
 from mesoslip.campaign.point import compute
@@ -44,8 +44,7 @@ VELOCITIES = [1e-6, 2e-6, 4e-6]
 def finished(config, after=None):
     """A run to its end, and its end."""
     with Realization(config, 0, after=after, estimates_errors=False) as one:
-        while not one.finished:
-            one.advance()
+        at_end(one)
         return one, one.end
 
 

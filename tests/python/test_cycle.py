@@ -9,7 +9,7 @@ import math
 import mesoslip
 import numpy as np
 import pytest
-from conftest import ROOT
+from conftest import ROOT, at_end
 from mesoslip.cycles import branch
 from mesoslip.cycles.branch import adapted
 from mesoslip.cycles.coordinates import PINNED, SLIDER, Coordinates
@@ -60,8 +60,7 @@ def regular() -> mesoslip.Cycle:
 def test_cycle_agrees_with_a_long_run(regular):
     config = configuration("run.duration=4s", "output.interval=4s")
     with mesoslip.Realization(config, estimates_errors=False) as run:
-        while not run.finished:
-            run.advance()
+        at_end(run)
         slips = run.records("slips")[-11:]
     assert regular.motion == "periodic"
     assert regular.multiple == 1
@@ -86,8 +85,7 @@ def test_contacts_that_break_together():
         "output.interval=2s",
     )
     with mesoslip.Realization(one_by_one) as run:
-        while not run.finished:
-            run.advance()
+        at_end(run)
         slips = run.records("slips")
     peaks, times = slips["force_before"], slips["start_time"]
     assert len(slips) == 4

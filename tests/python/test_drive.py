@@ -9,7 +9,7 @@ import mesoslip
 import numpy as np
 import pytest
 import tomli_w
-from conftest import klein_tables, long
+from conftest import at_end, klein_tables, long
 from kinds import KINDS, RAMPS, configuration, pairwise
 from mesoslip import Config, ConfigError
 from mesoslip.simulation.realization import Realization
@@ -651,10 +651,7 @@ def test_an_avalanche_at_the_end_of_the_drive_comes_to_its_end():
             contacts__threshold__relative_width=0.002,
             output={"interval": 1e-3},
         )
-        realization = Realization(config, 0)
-        while not realization.finished:
-            realization.advance(advances)
-        return realization
+        return at_end(Realization(config, 0), advances)
 
     # The shortest duration with a break, to the last bit.
     none, some = 0.0, 0.1

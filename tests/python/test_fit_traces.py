@@ -14,13 +14,13 @@ from mesoslip.configuration.config import Config
 from mesoslip.errors import ConfigError, FileError
 from mesoslip.execution.stop import Stop
 from mesoslip.inference import apparatus, checks, likelihood, run_in
+from mesoslip.inference.apparatus import Instrument, low_pass
+from mesoslip.inference.checks import sentence
 from mesoslip.inference.features import Feature
 from mesoslip.inference.fit import prepare as prepare_all
 from mesoslip.inference.fit import usable_summaries
 from mesoslip.inference.fit_plan import Plan
 from mesoslip.inference.fit_trace import as_plan
-from mesoslip.inference.instrument import Instrument, low_pass
-from mesoslip.inference.misfit import sentence
 from mesoslip.inference.noise import Noise, cleaned
 from mesoslip.inference.predict import _with_own_level
 from mesoslip.inference.prior import FILTER, LEVEL

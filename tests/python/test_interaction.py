@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from conftest import long
+from conftest import at_end, long
 from mesoslip import Config
 from mesoslip.simulation.realization import Realization
 from mesoslip.simulation.recorded_tables import AVALANCHE_COLUMNS
@@ -42,10 +42,7 @@ def lattice(kind: str, columns: int, rows: int, bonds: float) -> dict:
 
 
 def finish(config: Config, segment: int | None = None) -> Realization:
-    realization = Realization(config, 0)
-    while not realization.finished:
-        realization.advance(segment)
-    return realization
+    return at_end(Realization(config, 0), segment)
 
 
 def column(realization: Realization, name: str) -> np.ndarray:
@@ -218,8 +215,7 @@ def test_a_shifted_lattice_gives_a_shifted_result(klein, kind, shift, slider):
         values[:] = moved(values.T, *shift).T
     there = taken_up(config, state, start)
     for one in (here, there):
-        while not one.finished:
-            one.advance()
+        at_end(one)
     assert here.breaks == there.breaks > 150
     assert column(here, "size").max() > 3
     for name in AVALANCHE_COLUMNS:

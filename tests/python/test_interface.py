@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import long
+from conftest import at_end, long
 from mesoslip import Config, Realization
 from numpy.typing import NDArray
 from plain_interface import PlainInterface
@@ -52,10 +52,7 @@ def row(blocks: int, duration: float, **slider: Any) -> dict[str, Any]:
 
 def finished(tables: dict[str, Any]) -> Realization:
     """A realization at its end."""
-    one = Realization(Config.from_dict(tables))
-    while not one.finished:
-        one.advance()
-    return one
+    return at_end(Realization(Config.from_dict(tables)))
 
 
 TOP = {"loading": "top", "stiffness": None, "top_stiffness": 40.0}

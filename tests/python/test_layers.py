@@ -6,7 +6,7 @@ import mesoslip
 import numpy as np
 import pytest
 import sksundae
-from conftest import long
+from conftest import at_end, long
 from mesoslip import _core
 from mesoslip.output import layout
 from mesoslip.simulation.realization import Realization
@@ -24,10 +24,7 @@ def layered(layers, **more):
 
 
 def finish(config):
-    realization = Realization(config, 0)
-    while not realization.finished:
-        realization.advance()
-    return realization
+    return at_end(Realization(config, 0))
 
 
 def chain(layers, contact=0.0, drag=0.0, damping=0.0, base=None):
@@ -341,9 +338,7 @@ def test_everything_pinned_rings_at_the_frequency_of_the_base(klein):
 def test_segments_of_a_layered_run_do_not_matter(klein):
     config = klein(slider=layered(8), run__duration=2.2, output__layers=True)
     whole = finish(config)
-    pieces = Realization(config, 0)
-    while not pieces.finished:
-        pieces.advance(501)
+    pieces = at_end(Realization(config, 0), 501)
     assert np.array_equal(whole.trace, pieces.trace)
     assert np.array_equal(whole.layer_trace, pieces.layer_trace)
 

@@ -5,6 +5,7 @@ import re
 import mesoslip
 import numpy as np
 import pytest
+from conftest import at_end
 from kinds import configuration
 from mesoslip import Config, ConfigError, Realization
 from mesoslip.analysis.fronts import static_balance
@@ -57,8 +58,7 @@ def test_blocks_that_hardly_feel_each_other_are_rigid_sliders_of_their_loads(eng
         # The random numbers of block 2 are those of another realization.
         one = Realization(Config.from_dict(rigid))
         one.number = block << 40 if engine == "eq" else 0
-        while not one.finished:
-            one.advance()
+        at_end(one)
         breaks += one.breaks
         theirs = one.records("trace")["contact_force"]
         scale = abs(theirs).max()
@@ -100,17 +100,14 @@ def test_the_output_has_the_load_of_each_block(pressed):
 
 
 def test_a_resumed_run_is_equal_to_the_bit(pressed):
-    whole = Realization(pressed)
-    while not whole.finished:
-        whole.advance()
+    whole = at_end(Realization(pressed))
     part = Realization(pressed)
     for _ in range(3):
         part.advance(60)
     assert not part.finished
     again = Realization(pressed)
     again.restore(part.save(), {name: part.rows(name) for name in part.counts})
-    while not again.finished:
-        again.advance()
+    at_end(again)
     for mine, theirs in zip(records(again), records(whole), strict=True):
         np.testing.assert_array_equal(mine, theirs)
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import long
+from conftest import at_end, long
+from mesoslip.simulation.audit import step_errors
 from mesoslip.simulation.realization import Realization
-from mesoslip.simulation.step_errors import step_errors
 from mesoslip.theory.force_curve import ForceCurve
 from oracles import frozen_law, stationary_force
 from states import entries, reals, saved
@@ -28,10 +28,7 @@ LAYERS = {"mass": 1.47e-3, "stiffness": 97.0, "kind": "layered", "layers": 4}
 
 
 def finish(config, advances=None, *, estimates_errors=False):
-    realization = Realization(config, 0, estimates_errors=estimates_errors)
-    while not realization.finished:
-        realization.advance(advances)
-    return realization
+    return at_end(Realization(config, 0, estimates_errors=estimates_errors), advances)
 
 
 def dispersion(width, law="gaussian"):

@@ -354,6 +354,15 @@ def test_a_model_with_a_fit_beside_it_is_accepted(tmp_path):
     assert mesoslip.Config.from_toml(tree.attrs["configuration"]).spring_stiffness == 97.0
 
 
+@pytest.mark.parametrize(("name", "words"), [("revs", "revolutions"), ("slip um", "slider disp")])
+def test_missing_numbers_of_any_quantity_are_reported(tmp_path, name, words):
+    rows = [f"{n},{n % 3},{'' if n == 4 else n}\n" for n in range(9)]
+    record = record_of(tmp_path / "a.csv", f"time [s],force [N],{name}\n" + "".join(rows))
+    assert any(
+        one.startswith(words) and one.endswith("missing in 1 samples") for one in record.report
+    )
+
+
 def test_units_have_a_row_with_a_form_of_time_stamps(tmp_path):
     """A preamble, names above units, decimal commas, European dates, a temperature."""
     rows = [f"03.04.2026 14:05:0{n},5;{n},25;{3 * n},0;23,4\n" for n in range(9)]

@@ -15,7 +15,7 @@ from mesoslip.output.kinds import KINDS as OUTPUTS
 from mesoslip.reports.content import Subject
 from mesoslip.reports.method_paragraphs import METHODS, curve_method, onset_method, run_method
 from mesoslip.reports.references import CITATION, PROGRAM, REFERENCES, numbered
-from mesoslip.reports.sections.methods import methods
+from mesoslip.reports.sections.origin import methods
 
 
 @pytest.mark.parametrize("kind", KINDS)

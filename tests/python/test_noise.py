@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from mesoslip.analysis.even_traces import power_spectrum
 from mesoslip.analysis.noise import estimate_noise, parts_of
-from mesoslip.analysis.power_spectrum import power_spectrum
 from scipy.signal import lfilter, welch
 
 COUNT = 40_000

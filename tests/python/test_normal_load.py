@@ -8,6 +8,7 @@ import math
 import mesoslip
 import numpy as np
 import pytest
+from conftest import at_end
 from kinds import LOAD, VIBRATING, configuration
 from mesoslip import Config, ConfigError, Realization
 from mesoslip.analysis.response import write_csv
@@ -51,8 +52,7 @@ def step(force):
 
 def finished(config, **options):
     with Realization(config, estimates_errors=False, **options) as one:
-        while not one.finished:
-            one.advance()
+        at_end(one)
         return one, one.records("trace")
 
 

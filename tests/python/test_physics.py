@@ -5,7 +5,7 @@ from __future__ import annotations
 import mesoslip
 import numpy as np
 import pytest
-from conftest import long
+from conftest import at_end, long
 from mesoslip.configuration.threshold_laws import LAWS as LAWS_BY_NAME
 from mesoslip.simulation.realization import Realization
 from mesoslip.simulation.recorded_tables import ENERGY_COLUMNS
@@ -172,9 +172,7 @@ def test_results_do_not_depend_on_how_they_are_computed(klein):
     together = mesoslip.run(config, executor=2)
     one_by_one = mesoslip.run(config, executor=1)
     single = mesoslip.run(alone)
-    piecewise = Realization(alone, 0)
-    while not piecewise.finished:
-        piecewise.advance(997)
+    piecewise = at_end(Realization(alone, 0), 997)
     for name in ("displacement", "velocity", "spring_force", "contact_force"):
         np.testing.assert_array_equal(together[name].values, one_by_one[name].values)
         np.testing.assert_array_equal(together[name].values[0], single[name].values[0])

@@ -21,10 +21,10 @@ from mesoslip.output import files
 from mesoslip.output.arrays import Stored
 from mesoslip.output.kinds import KINDS as OUTPUTS
 from mesoslip.output.writing import write, write_results
-from mesoslip.plots import lines
+from mesoslip.plots import extent as extents
+from mesoslip.plots.axis import logarithmic
 from mesoslip.plots.extent import MAX_PARTS, Extent
 from mesoslip.plots.key_names import changes_in_a_line
-from mesoslip.plots.logarithmic import logarithmic
 from mesoslip.plots.printing import JOURNALS
 from mesoslip.plots.style import curve_style, styled
 from mesoslip.plots.sweep_panels import CHOICE_COLORS
@@ -223,10 +223,10 @@ def many_samples(count, realizations=1):
 @pytest.mark.parametrize("against", [long("time"), "displacement"])
 def test_a_line_shows_the_extremes_of_many_samples(monkeypatch, block, against):
     """Far fewer points than samples, all of them samples, none of the spikes lost."""
-    monkeypatch.setattr(lines, "BLOCK", block)
+    monkeypatch.setattr(extents, "BLOCK", block)
     tree = many_samples(200_000)
     extent = Extent(against=against)
-    x, y = lines.line(tree, (extent.horizontal[0], "spring_force"), extent, (0.0, 10.0))
+    x, y = extents.line(tree, (extent.horizontal[0], "spring_force"), extent, (0.0, 10.0))
     assert len(x) <= 5 * MAX_PARTS + 2 * 200_000 / block
     along, force = tree[extent.horizontal[0]].values.ravel(), tree["spring_force"].values[0]
     assert y.max() == force.max()
@@ -238,7 +238,7 @@ def test_a_line_shows_the_extremes_of_many_samples(monkeypatch, block, against):
         assert y[near].min() <= force[inside].min()
         assert y[near].max() >= force[inside].max()
     # A window with few samples shows each.
-    _, values = lines.line(tree, ("time", "spring_force"), extent, (1.0, 1.1))
+    _, values = extents.line(tree, ("time", "spring_force"), extent, (1.0, 1.1))
     times = tree["time"].values
     np.testing.assert_array_equal(values, force[(times >= 1.0) & (times <= 1.1)])
 
@@ -259,7 +259,7 @@ def test_what_is_not_drawn_is_not_read():
     lazy = xr.core.indexing.LazilyIndexedArray(Watched())
     data["spring_force"] = xr.Variable(("realization", "time"), lazy)
     data["velocity"] = xr.Variable(("realization", "time"), lazy)
-    lines.line(xr.DataTree(data), ("time", "spring_force"), Extent(), (2.0, 2.1))
+    extents.line(xr.DataTree(data), ("time", "spring_force"), Extent(), (2.0, 2.1))
     assert len(read) == 1
     places = np.arange(100_000)[read[0].tuple[-1]]
     assert len(places) < 1100

@@ -8,7 +8,7 @@ from contextlib import suppress
 
 import numpy as np
 import pytest
-from conftest import klein_tables
+from conftest import at_end, klein_tables
 from kinds import KINDS, configuration
 from mesoslip import Config, Realization, RunError
 from mesoslip.execution.local import LocalPool
@@ -27,10 +27,7 @@ SHORT = {"contacts__count": 200, "run__duration": 2.5, "output__slip_interval": 
 
 @pytest.fixture(scope="module")
 def whole():
-    one = Realization(Config.from_dict(klein_tables(**SHORT)))
-    while not one.finished:
-        one.advance()
-    return one
+    return at_end(Realization(Config.from_dict(klein_tables(**SHORT))))
 
 
 def test_it_comes_to_a_time_and_no_farther_than_the_next_event(klein, whole):
@@ -158,9 +155,7 @@ def test_realizations_run_together_are_those_made_alone(kind):
     if not Realization.run_together([together]):
         assert not together.advances
         return
-    alone = Realization(config, 1)
-    while not alone.finished:
-        alone.advance()
+    alone = at_end(Realization(config, 1))
     for one in (alone, together):
         one.kernel_seconds = 0.0
     assert together.save() == alone.save()
@@ -172,8 +167,7 @@ def test_realizations_run_together_end_with_the_first_that_is_long_or_has_starte
     config = Config.from_dict(klein_tables(run__realizations=60, **FEW | {"contacts__count": 9}))
     alone = [Realization(config, number) for number in range(60)]
     for one in alone:
-        while not one.finished:
-            one.advance()
+        at_end(one)
     work = sorted(one.advances + one.breaks for one in alone)[30]
     monkeypatch.setattr(realization, "SHORT_WORK", work)
     some = Realization.all_of(config)

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 import tomli_w
 import xarray as xr
-from conftest import klein_tables, long
+from conftest import at_end, klein_tables, long
 from invariants import differences
 from kinds import COARSE, KINDS, RANDOM, THERMAL, configuration, pairwise
 from mesoslip import Config, FileError, RunError
@@ -125,8 +125,7 @@ def test_cuts_between_reversals_keep_contacts_that_break_next(klein, ageing, for
         },
     )
     whole_run, cut = Realization(config, 0), Realization(config, 0)
-    while not whole_run.finished:
-        whole_run.advance()
+    at_end(whole_run)
     cut.advance(advances)
     while not cut.finished:
         before, cut = cut, Realization(config, 0)
@@ -274,8 +273,7 @@ def test_a_realization_may_end_while_a_checkpoint_is_written(tmp_path, monkeypat
 
         def end_after_flush(realizations):
             flush(realizations)
-            while not one.finished:
-                one.advance(100)
+            at_end(one, 100)
             checkpoint.visit(one)
 
         monkeypatch.setattr(checkpoint, "_flush", end_after_flush)
@@ -520,9 +518,7 @@ def test_whatever_ends_a_run_leaves_a_checkpoint(klein, tmp_path):
 
 
 def test_contacts_of_a_finished_run_are_gone():
-    one = Realization(configuration("rigid"), 0)
-    while not one.finished:
-        one.advance()
+    one = at_end(Realization(configuration("rigid"), 0))
     one.close()
     with pytest.raises(RunError, match="over"):
         _ = one.contacts

@@ -24,7 +24,7 @@ from mesoslip.analysis.strokes import (
 from mesoslip.analysis.strokes.cycles import overall
 from mesoslip.analysis.strokes.measure import Measured
 from mesoslip.reports.content import Subject
-from mesoslip.reports.sections.strokes import strokes as report_section
+from mesoslip.reports.sections.catalogues import strokes as report_section
 from numpy.typing import NDArray
 from stroke_records import made
 

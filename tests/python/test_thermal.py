@@ -8,7 +8,7 @@ from typing import Any
 import mesoslip
 import numpy as np
 import pytest
-from conftest import long
+from conftest import at_end, long
 from kinds import configuration
 from mesoslip import Config, ConfigError
 from mesoslip.simulation.realization import Realization
@@ -252,9 +252,7 @@ def test_uniform_motion_does_not_depend_on_segments(changes):
     )
     origins = []
     for advances in (1, 100_000):
-        realization = Realization(config, 0)
-        while not realization.finished:
-            realization.advance(advances)
+        realization = at_end(Realization(config, 0), advances)
         origins.append(realization.contacts["origin"])
     np.testing.assert_array_equal(*origins)
 

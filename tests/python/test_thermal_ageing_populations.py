@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import long
+from conftest import at_end, long
 from kinds import RELAX, configuration
 from mesoslip import Config, Realization
 from mesoslip.theory.contacts import contact_theory
@@ -153,8 +153,7 @@ def test_the_error_at_resolution_one_is_seen():
         for resolution in (1.0, 0.25)
     ]
     for one in runs:
-        while not one.finished:
-            one.advance()
+        at_end(one)
     starts = [one.slips[:, 1].min(initial=math.inf) for one in runs]
     before = runs[0].trace[:, 0] < min(starts)
     error = np.max(np.abs(runs[0].trace[before, 5] - runs[1].trace[before, 5]))

@@ -8,7 +8,7 @@ from typing import Any
 import mesoslip
 import numpy as np
 import pytest
-from conftest import long
+from conftest import at_end, long
 from kinds import configuration
 from mesoslip import Config, ConfigError, Realization
 from mesoslip.theory.contacts import contact_theory
@@ -20,9 +20,7 @@ TABLE = {"law": "table", "samples": [0.8, 0.9, 1.0, 1.05, 1.1, 1.15]}
 
 
 def finished(config: Config) -> Realization:
-    one = Realization(config, estimates_errors=False)
-    while not one.finished:
-        one.advance()
+    one = at_end(Realization(config, estimates_errors=False))
     one.close()
     return one
 

@@ -1,8 +1,4 @@
-"""A sweep, checked: a configuration that is varied along axes.
-
-Axes multiply, and each combination is run for a number of realizations. A *point* is one
-realization of one combination.
-"""
+"""A sweep, checked: a configuration varied along axes."""
 
 from __future__ import annotations
 

@@ -1,11 +1,15 @@
-"""Dotted keys of a configuration: the kind of their values, and their units."""
+"""Dotted keys of a configuration: the kind of their values, their units, and their meanings."""
 
 from __future__ import annotations
 
+import ast
 import difflib
+import inspect
+import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache, partial
+from itertools import pairwise
 from typing import Any, get_args, get_origin
 
 from pydantic import BeforeValidator
@@ -89,3 +93,31 @@ def nearest_keys(key: str) -> list[str]:
     name = key.rpartition(".")[2]
     elsewhere = [one for one in known if one.rpartition(".")[2] == name]
     return elsewhere or difflib.get_close_matches(key, known, 1)
+
+
+@cache
+def meanings(table: type[Table]) -> dict[str, str]:
+    """The meanings of the keys of a table, by the names of their fields."""
+    found: dict[str, str] = {}
+    for one in reversed(table.__mro__):
+        if not issubclass(one, Table) or one is Table:
+            continue
+        tree = ast.parse(inspect.getsource(sys.modules[one.__module__]))
+        body = next(
+            node.body
+            for node in tree.body
+            if isinstance(node, ast.ClassDef) and node.name == one.__name__
+        )
+        for field, text in pairwise(body):
+            if not (isinstance(field, ast.AnnAssign) and isinstance(text, ast.Expr)):
+                continue
+            if isinstance(text.value, ast.Constant) and isinstance(field.target, ast.Name):
+                found[field.target.id] = inspect.cleandoc(str(text.value.value)).replace("\n", " ")
+    return found
+
+
+def meaning(key: str) -> str:
+    """The meaning of a dotted key in the first table that has it; empty for a whole table."""
+    *_, name = key.split(".")
+    texts = (meanings(table).get(name, "") for table in tables_of(key))
+    return next(texts, "").replace("`", "")

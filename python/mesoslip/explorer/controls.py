@@ -12,8 +12,7 @@ from mesoslip.configuration.contacts.tables.interaction import LATTICES
 from mesoslip.configuration.contacts.tables.thermal import BOLTZMANN
 from mesoslip.configuration.contacts.tables.track import CORRELATIONS
 from mesoslip.configuration.differences import flat
-from mesoslip.configuration.keys import key_kind
-from mesoslip.configuration.meanings import meaning
+from mesoslip.configuration.keys import key_kind, meaning
 from mesoslip.configuration.sliders import SLIDERS
 from mesoslip.configuration.sliders.interface import LOADINGS
 from mesoslip.configuration.threshold_laws import LAWS

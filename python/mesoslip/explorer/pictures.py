@@ -20,8 +20,7 @@ from mesoslip.output.inputs import OutputLike, as_run
 from mesoslip.output.samples import times_of
 from mesoslip.output.tree import build_tree
 from mesoslip.plots.close_up import largest_slip, slip_window
-from mesoslip.plots.extent import Extent
-from mesoslip.plots.lines import line
+from mesoslip.plots.extent import Extent, line
 from mesoslip.plots.snapshots import is_on_lattice
 from mesoslip.plots.trace_variables import NAMES, UNITS, force_of
 from mesoslip.quantities import UNKNOWN, Scale, number, scale_for, with_unit

@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 
 from mesoslip.analysis.alternating_extremes import Samples
-from mesoslip.analysis.power_spectrum import power_spectrum
+from mesoslip.analysis.even_traces import power_spectrum
 from mesoslip.analysis.sampled_slips import FoundSlips
 from mesoslip.analysis.sampled_slips.windows import Windows, lines_through
 from mesoslip.analysis.strokes import Piece, find_slips_between_reversals

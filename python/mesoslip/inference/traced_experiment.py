@@ -18,9 +18,8 @@ from mesoslip.array_types import Array, Dataset, DataTree
 from mesoslip.configuration.config import Config
 from mesoslip.errors import ConfigError, FileError, RunError
 from mesoslip.execution.stop import StoppedError, StopRequest
-from mesoslip.inference.apparatus import Apparatus, declared_values, own_config
+from mesoslip.inference.apparatus import Apparatus, Instrument, declared_values, own_config
 from mesoslip.inference.fit_plan import Plan
-from mesoslip.inference.instrument import Instrument
 from mesoslip.inference.noise import Noise, cleaned
 from mesoslip.inference.prior import WANDER, level_name
 from mesoslip.inference.run_in import run_in_samples

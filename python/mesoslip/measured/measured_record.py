@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -24,27 +24,11 @@ from mesoslip.measured.thinning import thinned
 from mesoslip.quantities import number, with_unit
 
 MIN_SAMPLES = 4
-# Quantities that a record keeps beside time and force.
-OTHERS = (
-    "load_point",
-    "displacement",
-    "normal_force",
-    "normal_stress",
-    "revolutions",
-    "rotation_speed",
-    "sliding_speed",
+# Quantities of a record that are variables of outputs.
+SIGNALS = (
+    *("normal_force", "normal_stress", "revolutions", "rotation_speed", "sliding_speed"),
     "acoustic_emission",
 )
-WORDS = {
-    "load_point": "load point",
-    "displacement": "slider displacement",
-    "shear_stress": "shear stress",
-    "normal_force": "normal force",
-    "normal_stress": "normal stress",
-    "rotation_speed": "rotation speed",
-    "sliding_speed": "sliding speed",
-    "acoustic_emission": "acoustic emission",
-}
 
 
 @dataclass(frozen=True)
@@ -71,19 +55,11 @@ class Record:
     mean_normal_force: float | None
     """Mean normal force, recorded or given."""
     load_point: Array | None
-    """Displacement of the drive; NaN for missing samples, as in the next three."""
+    """Displacement of the drive; NaN for missing samples, as in the next two."""
     displacement: Array | None
     """Displacement of the slider."""
-    normal_force: Array | None
-    normal_stress: Array | None
-    revolutions: Array | None
-    """Number of revolutions of a disc."""
-    rotation_speed: Array | None
-    """Revolutions per second."""
-    sliding_speed: Array | None
-    """Speed of sliding [m/s]."""
-    acoustic_emission: Array | None
-    """A second channel [V], or plain numbers."""
+    signals: Mapping[str, Array]
+    """The recorded ones of `SIGNALS`: rotations in revolutions, emission in V or plain numbers."""
     columns: Sequence[RecordedColumn]
     """All columns of numbers of the file, with the rows that are not used."""
     report: Sequence[str]
@@ -149,9 +125,14 @@ def read_record(paths: Sequence[Path], trace: TraceDescription) -> Record:
         raise FileError(f"{path}: has {len(order.rows)} samples whose times increase")
     picked = usable if order.time is times else rows[order.rows]
     notes += order.notes
-    for name in OTHERS:
-        if name in values and (count := int(np.isnan(values[name][picked]).sum())):
-            notes.append(f"{WORDS[name]}: missing in {count} samples")
+    kept = {
+        name: values[name][picked]
+        for name in ("load_point", "displacement", *SIGNALS)
+        if name in values
+    }
+    for name, one in kept.items():
+        if count := int(np.isnan(one).sum()):
+            notes.append(f"{_in_words(name)}: missing in {count} samples")
     if inside.sum() < len(inside):
         outside = int((~inside).sum())
         notes.append(f"left out, before start or after end: {outside} of {inside.size}")
@@ -162,7 +143,9 @@ def read_record(paths: Sequence[Path], trace: TraceDescription) -> Record:
         force[picked],
         made.is_friction,
         made.mean_normal,
-        **{name: values[name][picked] if name in values else None for name in OTHERS},
+        kept.pop("load_point", None),
+        kept.pop("displacement", None),
+        kept,
         columns=[
             _recorded(table, columns, index)
             for index in range(len(table.headers))
@@ -364,16 +347,18 @@ def _column_report(table: Table, columns: Assignment, values: dict[str, Array]) 
     for name, one in used.items():
         header = shown(table.headers[one.index]) if table.headers[one.index] else ""
         place = f"column {one.index + 1}{f' {header}' if header else ''}"
-        lines.append(
-            f"{WORDS.get(name, name)}: {place}{_scale(name, one)}, {_range(values[name], name)}"
-        )
+        lines.append(f"{_in_words(name)}: {place}{_scale(name, one)}, {_range(values[name], name)}")
     for name in FORCES:
         if name in used and name != force and not (force == "shear_stress" and name == "friction"):
-            lines.append(f"not used: {WORDS.get(name, name)}, as there is a {force}")
+            lines.append(f"not used: {_in_words(name)}, as there is a {force}")
     for index, why in sorted(columns.unused.items()):
         header = shown(table.headers[index]) if table.headers[index] else "without a name"
         lines.append(f"not used: column {index + 1} {header}{f' ({why})' if why else ''}")
     return lines
+
+
+def _in_words(name: str) -> str:
+    return "slider displacement" if name == "displacement" else name.replace("_", " ")
 
 
 def _scale(name: str, used: Used) -> str:

@@ -452,15 +452,10 @@ def _tree(
         "displacement": displacement,
         "velocity": speed,
         record.force_name: record.force,
-        "normal_force": record.normal_force,
-        "normal_stress": record.normal_stress,
-        "revolutions": record.revolutions,
-        "rotation_speed": record.rotation_speed,
-        "sliding_speed": record.sliding_speed,
-        "acoustic_emission": record.acoustic_emission,
+        **record.signals,
     }
-    if not record.is_friction and record.normal_force is not None:
-        traces["friction_coefficient"] = record.force / _pressing(record.normal_force)
+    if not record.is_friction and "normal_force" in record.signals:
+        traces["friction_coefficient"] = record.force / _pressing(record.signals["normal_force"])
     root = {
         name: variables.ROOT.variable(name, ("realization", "time"), values[np.newaxis])
         for name, values in traces.items()

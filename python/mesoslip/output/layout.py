@@ -160,13 +160,13 @@ def describe(results: Results) -> dict[str, GroupLayout]:
     """The layout of the output of a run, by group; the root is ""."""
     config = results.config
     layout = {"": _root(results), "slips": _slips(results), "energy": _energy(results)}
-    layout["stages"] = _stages(results)
+    layout["stages"] = _table(results, variables.STAGES, "stages", tables.STAGE_COLUMNS)
     if config.slip_interval is not None:
         layout["slip_traces"] = _slip_traces(results)
     if config.slider.block_count:
         layout["blocks"] = _blocks(results)
-        layout["ruptures"] = _ruptures(results)
-        layout["fronts"] = _fronts(results)
+        layout["ruptures"] = _table(results, variables.RUPTURES, "ruptures", tables.RUPTURE_COLUMNS)
+        layout["fronts"] = _table(results, variables.FRONTS, "fronts", FRONT_COLUMNS)
     if config.has_avalanches:
         layout["avalanches"] = _avalanches(results)
     if config.output.snapshots or config.output.snapshot_size:
@@ -174,6 +174,8 @@ def describe(results: Results) -> dict[str, GroupLayout]:
     return layout
 
 
+# Variables with another name than their column.
+RENAMED = {"block": "block_number"}
 # Traces of some sliders only.
 SPECIAL_TRACES = ("elastic_force", "base_displacement")
 
@@ -237,11 +239,12 @@ def _slips(results: Results) -> GroupLayout:
     return group.catalogue()
 
 
-def _stages(results: Results) -> GroupLayout:
-    group = _GroupBuilder(results, variables.STAGES, "stages")
-    for name in tables.STAGE_COLUMNS:
-        group.add_column(name)
-    return group.catalogue()
+def _table(results: Results, group: Group, table: str, columns: Sequence[str]) -> GroupLayout:
+    """A catalogue with the columns of its table."""
+    made = _GroupBuilder(results, group, table)
+    for name in columns:
+        made.add_column(RENAMED.get(name, name), name)
+    return made.catalogue()
 
 
 def _slip_traces(results: Results) -> GroupLayout:
@@ -285,21 +288,6 @@ def _blocks(results: Results) -> GroupLayout:
         else:
             group.add("block_normal_force", ("block",), values=load.max_force * shares)
     return GroupLayout({"block": slider.block_count}, group.entries, {})
-
-
-def _ruptures(results: Results) -> GroupLayout:
-    group = _GroupBuilder(results, variables.RUPTURES, "ruptures")
-    group.add_column("block_number", "block")
-    for name in tables.RUPTURE_COLUMNS[1:]:
-        group.add_column(name)
-    return group.catalogue()
-
-
-def _fronts(results: Results) -> GroupLayout:
-    group = _GroupBuilder(results, variables.FRONTS, "fronts")
-    for name in FRONT_COLUMNS:
-        group.add_column(name)
-    return group.catalogue()
 
 
 def _avalanches(results: Results) -> GroupLayout:

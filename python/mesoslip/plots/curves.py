@@ -11,8 +11,7 @@ from matplotlib.axes import Axes
 from mesoslip.array_types import Array
 from mesoslip.output.arrays import Tree
 from mesoslip.plots.axis import HorizontalAxis
-from mesoslip.plots.extent import Extent
-from mesoslip.plots.lines import line, max_size
+from mesoslip.plots.extent import Extent, line, max_size
 from mesoslip.plots.trace_variables import NAMES, UNITS
 from mesoslip.quantities import scale_for
 

@@ -11,7 +11,7 @@ from mesoslip.array_types import Array
 from mesoslip.configuration.config import Config
 from mesoslip.errors import MesoslipError
 from mesoslip.output.arrays import Arrays, Tree
-from mesoslip.plots.logarithmic import logarithmic
+from mesoslip.plots.axis import logarithmic
 from mesoslip.plots.response_record import MAX_MARKS
 from mesoslip.plots.style import BLUE, POINTS, RED, Canvas, canvas, titles, write_title
 from mesoslip.quantities import scale_for, with_error

@@ -11,7 +11,7 @@ from mesoslip.analysis.response import response_of, rows_of
 from mesoslip.array_types import Array
 from mesoslip.errors import RunError
 from mesoslip.output.arrays import Arrays, Tree
-from mesoslip.plots.logarithmic import logarithmic
+from mesoslip.plots.axis import logarithmic
 from mesoslip.plots.printing import is_narrow
 from mesoslip.plots.response_record import draw_record, fit_label, force_unit, title_record
 from mesoslip.plots.style import POINTS, RED, Canvas, canvas

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from mesoslip.array_types import Array, DataArray
 from mesoslip.configuration.units import from_cf_units
+from mesoslip.plots.axis import logarithmic
 from mesoslip.plots.key_names import name_of, symbol_or_name
-from mesoslip.plots.logarithmic import logarithmic
 from mesoslip.plots.style import BLUE, RED, axes_height, axes_width, characters, wrapped
 from mesoslip.quantities import Scale, number, scale_for
 

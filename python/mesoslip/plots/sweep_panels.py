@@ -11,8 +11,8 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from mesoslip.array_types import Array, Dataset
+from mesoslip.plots.axis import label_powers, logarithmic
 from mesoslip.plots.boundaries import REGIME
-from mesoslip.plots.logarithmic import label_powers, logarithmic
 from mesoslip.plots.style import POINTS
 from mesoslip.plots.sweep_axis import DIRECTION, DIRECTION_STYLES, SweptKey, spans_decades
 

@@ -19,14 +19,13 @@ from mesoslip.array_types import Array
 from mesoslip.configuration import arguments
 from mesoslip.configuration.config import Config
 from mesoslip.errors import RunError
-from mesoslip.simulation.audit import share_of_work
+from mesoslip.simulation.audit import COARSENING, StepErrors, share_of_work, step_errors
 from mesoslip.simulation.fronts import FrontFinder
 from mesoslip.simulation.kernel import Completed, Kernel, Progress, Words
 from mesoslip.simulation.kernel_setup import KernelSetup, tables_of
 from mesoslip.simulation.memory import check_memory
 from mesoslip.simulation.recorded_tables import CONTACT_COLUMNS, ENERGY_COLUMNS, Recorded, Rows
 from mesoslip.simulation.start import START, End, follow
-from mesoslip.simulation.step_errors import COARSENING, StepErrors, step_errors
 
 # Reasons why a run is over, by the kernel's names.
 ENDINGS = {

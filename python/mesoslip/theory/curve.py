@@ -10,46 +10,35 @@ from mesoslip.array_types import Dataset, DataTree
 from mesoslip.output.inputs import ConfigLike, as_config
 from mesoslip.output.provenance import program_attributes
 from mesoslip.output.variables import CRITICAL, CURVE, STRETCHES
+from mesoslip.text_rows import named_meanings
 from mesoslip.theory.contacts import contact_theory
 from mesoslip.theory.force_curve import ForceCurve
 
 # Units and meanings of the summary of a curve.
-SUMMARY = {
-    "K_star": (
-        "N/m",
-        "K* = max(-F'(X)): without delay, slow sliding from this start has no instability with a "
-        "stiffer spring; 0 if the force does not fall",
-    ),
-    "K_star_error": (
-        "N/m",
-        "estimated error of K*; for samples of thresholds two standard deviations, and the "
-        "correction for the bandwidth",
-    ),
-    "K_star_displacement": ("m", "displacement at K*"),
-    "K_star_estimate": ("N/m", "estimate of K*, Nk (f_s - f_b)/Delta f_s (S48)"),
-    "stable": (
-        "1",
-        "whether K >= K*, so that without delay slow sliding from this start has no instability",
-    ),
-    "X_c": ("m", "displacement at which the slider becomes unstable, smallest X with F'(X) = -K"),
-    "F_c": ("N", "force at X_c"),
-    "F_peak": ("N", "maximum force; none if the force does not fall"),
-    "X_peak": ("m", "displacement at the maximum force"),
-    "F_steady": ("N", "force of stationary slow sliding"),
-    "D0": ("1", "F(X_c)/F_s"),
-    "D1": ("1", "v_d (K M)^(1/2)/F_s"),
-    "D2": ("1", "-(1/2) F''(X_c) F_s/K^2"),
-    "D3": ("1", "-(1/6) F'''(X_c) F_s^2/K^3"),
-    "bandwidth": (
-        "1",
-        "bandwidth with which the density of samples of thresholds is estimated, relative to the "
-        "breaking stretch",
-    ),
-    "error": ("1", "estimated error of the force over F_s, with that of samples of thresholds"),
-    "slope_error": ("1", "estimated error of the slope over Nk"),
-    "digits": ("1", "reliable digits of the force"),
-    "conservation_error": ("1", "maximum relative error of the number of contacts"),
-}
+SUMMARY = named_meanings("""
+K_star | N/m | K* = max(-F'(X)): without delay, slow sliding from this start has no instability with
+    a stiffer spring; 0 if the force does not fall
+K_star_error | N/m | estimated error of K*; for samples of thresholds two standard deviations, and
+    the correction for the bandwidth
+K_star_displacement | m | displacement at K*
+K_star_estimate | N/m | estimate of K*, Nk (f_s - f_b)/Delta f_s (S48)
+stable | 1 | whether K >= K*, so that without delay slow sliding from this start has no instability
+X_c | m | displacement at which the slider becomes unstable, smallest X with F'(X) = -K
+F_c | N | force at X_c
+F_peak | N | maximum force; none if the force does not fall
+X_peak | m | displacement at the maximum force
+F_steady | N | force of stationary slow sliding
+D0 | 1 | F(X_c)/F_s
+D1 | 1 | v_d (K M)^(1/2)/F_s
+D2 | 1 | -(1/2) F''(X_c) F_s/K^2
+D3 | 1 | -(1/6) F'''(X_c) F_s^2/K^3
+bandwidth | 1 | bandwidth with which the density of samples of thresholds is estimated, relative to
+    the breaking stretch
+error | 1 | estimated error of the force over F_s, with that of samples of thresholds
+slope_error | 1 | estimated error of the slope over Nk
+digits | 1 | reliable digits of the force
+conservation_error | 1 | maximum relative error of the number of contacts
+""")
 # Points of a density over the stretch, and widths of the newborn stretches below their mean.
 DENSITY_POINTS, WIDTHS_BELOW = 2001, 6
 

@@ -23,10 +23,9 @@ from mesoslip.array_types import Array
 from mesoslip.errors import ConfigError, Problem
 from mesoslip.theory.contacts import contact_theory
 from mesoslip.theory.lives import law_parameters, newborn_stretch, scales
-from mesoslip.theory.renewal import POINTS, solve_renewal
+from mesoslip.theory.renewal import POINTS, solve_renewal, stretch_density
 from mesoslip.theory.sampled_law import WIDER, sampled_law
 from mesoslip.theory.sliders import loading_rate
-from mesoslip.theory.stretch_density import stretch_density
 
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config

@@ -17,7 +17,7 @@ from mesoslip.configuration.sliders.layered import LayeredSlider
 from mesoslip.configuration.sliders.quasistatic import QuasistaticSlider
 from mesoslip.configuration.sliders.rigid import RigidSlider
 from mesoslip.errors import Problem
-from mesoslip.theory.quantity import Quantity
+from mesoslip.theory.quantity import Quantity, named_quantities
 
 if TYPE_CHECKING:
     import numpy as np
@@ -26,6 +26,49 @@ if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
 
     Complex = NDArray[np.complexfloating[Any, Any]]
+
+# Units and meanings of derived quantities.
+quantity = named_quantities("""
+damping_rate | 1/s | setup damping, eta_S
+block_spacing | m | distance of blocks, a
+block_mass | kg | mass of a block, m_b = M/N_b
+omega_s | 1/s | setup frequency, Omega_S = (K/M)^(1/2)
+setup_period | s | period of the setup, tau_S = 2 pi/Omega_S
+omega_l | 1/s | ringing of the pinned slider without its spring, Omega_L = (Nk/M)^(1/2)
+ringing_period | s | period of the ringing, 2 pi/Omega_L
+film_drag_rate | 1/s | drag of the whole molten film per slider mass, N m eta/M
+slip_velocity_scale | m/s | velocity scale of a slip, Omega_S F_s/K
+slider_mass | kg | mass of all layers, M
+slider_stiffness | N/m | static stiffness of all springs, K
+chain_frequency | 1/s | lowest frequency of the chain without contacts
+chain_frequency_highest | 1/s | highest frequency of the chain
+loading_time | s | time in which the spring alone loads to F_s, F_s/(K v_d); scale of the time
+    between slips
+D1 | 1 | velocity of the drive over the scale Omega_S F_s/K of slips, v_d (K M)^(1/2)/F_s (S46)
+alpha | 1 | duration of a slip in which contacts break one after another (S46), in 1/Omega_S:
+    (6/D1)^(1/3)
+slip_time_sequential | s | duration of a slip in which contacts break one after another,
+    alpha/Omega_S
+B | 1 | start of a slip in which the whole film melts at once (S47), where the spring force falls by
+    B F_s (Omega_S t)^2: (D0 - eta D1/Omega_S)/2, estimate with D0 = 1 - delta; mesoslip onset
+    computes D0
+mean_avalanche_size | 1 | mean size of avalanches in stationary sliding without interaction, 1 +
+    Nk/K
+neighbour_spring | N/m | spring of neighbours, k_b = K_b N_b
+sound_velocity | m/s | sound in the row, c = a (k_b/m_b)^(1/2)
+block_time | s | time of sound over a block, a/c
+crossing_time | s | time of sound over the interface
+decay_length | m | length in which a static load of the pinned row decays, Lambda = a (k_b/k')^(1/2)
+pinned_frequency_highest | 1/s | highest of the pinned row
+drive_ratio | 1 | springs of the drive over the row of blocks, (K + K_t)/K_b
+contact_ratio | 1 | stiffness of the contacts over that of the row, Nk/K_b = (length/Lambda)^2
+pinned_base_frequency | 1/s | frequency of base and slider pinned together, [K_B/(M_B + M +
+    Nm)]^(1/2)
+bending_frequency | 1/s | lowest bending frequency of the cantilever
+bending_ratio | 1 | bending frequency over (K/M)^(1/2) of the cantilever
+beta | 1 | duration of such a slip, in 1/Omega_S: B^(-1/2)
+slip_time_melting | s | duration of such a slip, beta/Omega_S
+""")
 
 
 class DynamicStiffness(NamedTuple):
@@ -174,17 +217,12 @@ def quantities(slider: SliderTable, config: Config) -> Iterator[Quantity]:  # no
 @quantities.register
 def _quasistatic_quantities(slider: QuasistaticSlider, config: Any) -> Iterator[Quantity]:
     if slider.stiffness is not None and config.contacts.reattach:
-        yield Quantity(
-            "mean_avalanche_size",
-            1 + config.contacts.stiffness / slider.stiffness,
-            "1",
-            "mean size of avalanches in stationary sliding without interaction, 1 + Nk/K",
-        )
+        yield quantity("mean_avalanche_size", 1 + config.contacts.stiffness / slider.stiffness)
 
 
 @quantities.register
 def _rigid_quantities(slider: RigidSlider, config: Any) -> Iterator[Quantity]:
-    yield Quantity("damping_rate", slider.damping_rate, "1/s", "setup damping, eta_S")
+    yield quantity("damping_rate", slider.damping_rate)
     yield from _inertial_quantities(slider, config)
 
 
@@ -192,92 +230,52 @@ def _rigid_quantities(slider: RigidSlider, config: Any) -> Iterator[Quantity]:
 def _interface_quantities(slider: InterfaceSlider, config: Any) -> Iterator[Quantity]:
     contacts = config.contacts
     block = contacts.stiffness / slider.blocks
-    yield Quantity("block_spacing", slider.block_spacing, "m", "distance of blocks, a")
-    yield Quantity("block_mass", slider.block_mass, "kg", "mass of a block, m_b = M/N_b")
+    yield quantity("block_spacing", slider.block_spacing)
+    yield quantity("block_mass", slider.block_mass)
     if slider.blocks > 1:
         spring, neighbour = slider.neighbour_spring, slider.neighbour_frequency
-        yield Quantity("neighbour_spring", spring, "N/m", "spring of neighbours, k_b = K_b N_b")
-        sound = slider.sound_velocity
-        yield Quantity("sound_velocity", sound, "m/s", "sound in the row, c = a (k_b/m_b)^(1/2)")
-        yield Quantity("block_time", 1 / neighbour, "s", "time of sound over a block, a/c")
-        crossing = slider.blocks / neighbour
-        yield Quantity("crossing_time", crossing, "s", "time of sound over the interface")
-        yield Quantity(
-            "decay_length",
-            slider.block_spacing * math.sqrt(spring / block),
-            "m",
-            "length in which a static load of the pinned row decays, Lambda = a (k_b/k')^(1/2)",
-        )
+        yield quantity("neighbour_spring", spring)
+        yield quantity("sound_velocity", slider.sound_velocity)
+        yield quantity("block_time", 1 / neighbour)
+        yield quantity("crossing_time", slider.blocks / neighbour)
+        yield quantity("decay_length", slider.block_spacing * math.sqrt(spring / block))
         highest = math.sqrt(4 * neighbour**2 + block / slider.block_mass)
-        yield Quantity("pinned_frequency_highest", highest, "1/s", "highest of the pinned row")
-        yield Quantity(
-            "drive_ratio",
-            slider.spring_stiffness / (slider.bar_stiffness or math.inf),
-            "1",
-            "springs of the drive over the row of blocks, (K + K_t)/K_b",
-        )
-        yield Quantity(
-            "contact_ratio",
-            contacts.stiffness / (slider.bar_stiffness or math.inf),
-            "1",
-            "stiffness of the contacts over that of the row, Nk/K_b = (length/Lambda)^2",
-        )
-    yield Quantity("damping_rate", slider.damping_rate, "1/s", "setup damping, eta_S")
+        yield quantity("pinned_frequency_highest", highest)
+        yield quantity("drive_ratio", slider.spring_stiffness / (slider.bar_stiffness or math.inf))
+        yield quantity("contact_ratio", contacts.stiffness / (slider.bar_stiffness or math.inf))
+    yield quantity("damping_rate", slider.damping_rate)
     yield from _inertial_quantities(slider, config)
 
 
 def _inertial_quantities(slider: InertialSlider, config: Config) -> Iterator[Quantity]:
     contacts, omega_s = config.contacts, slider.omega_s
     omega_l = math.sqrt(contacts.stiffness / slider.mass)
-    yield Quantity("omega_s", omega_s, "1/s", "setup frequency, Omega_S = (K/M)^(1/2)")
-    period = 2 * math.pi / omega_s
-    yield Quantity("setup_period", period, "s", "period of the setup, tau_S = 2 pi/Omega_S")
-    yield Quantity(
-        "omega_l",
-        omega_l,
-        "1/s",
-        "ringing of the pinned slider without its spring, Omega_L = (Nk/M)^(1/2)",
-    )
-    yield Quantity(
-        "ringing_period", 2 * math.pi / omega_l, "s", "period of the ringing, 2 pi/Omega_L"
-    )
+    yield quantity("omega_s", omega_s)
+    yield quantity("setup_period", 2 * math.pi / omega_s)
+    yield quantity("omega_l", omega_l)
+    yield quantity("ringing_period", 2 * math.pi / omega_l)
     film = contacts.count * contacts.contact_drag / slider.mass
-    yield Quantity(
-        "film_drag_rate", film, "1/s", "drag of the whole molten film per slider mass, N m eta/M"
-    )
-    scale = slider.velocity_scale(config)
-    yield Quantity("slip_velocity_scale", scale, "m/s", "velocity scale of a slip, Omega_S F_s/K")
+    yield quantity("film_drag_rate", film)
+    yield quantity("slip_velocity_scale", slider.velocity_scale(config))
     yield from _first_slip(slider, config, film)
 
 
 @quantities.register
 def _layered_quantities(slider: LayeredSlider, config: Any) -> Iterator[Quantity]:
-    yield Quantity("slider_mass", slider.mass, "kg", "mass of all layers, M")
-    stiffness = "static stiffness of all springs, K"
-    yield Quantity("slider_stiffness", slider.stiffness, "N/m", stiffness)
+    yield quantity("slider_mass", slider.mass)
+    yield quantity("slider_stiffness", slider.stiffness)
     lowest, *_, highest = (slider.frequencies[0], *slider.frequencies)
-    yield Quantity(
-        "chain_frequency", lowest, "1/s", "lowest frequency of the chain without contacts"
-    )
-    yield Quantity("chain_frequency_highest", highest, "1/s", "highest frequency of the chain")
+    yield quantity("chain_frequency", lowest)
+    yield quantity("chain_frequency_highest", highest)
     if slider.base is not None:
         film_mass = config.contacts.count * config.contacts.contact_mass
         mass = slider.base.mass + slider.mass + film_mass
-        yield Quantity(
-            "pinned_base_frequency",
-            math.sqrt(slider.base.stiffness / mass),
-            "1/s",
-            "frequency of base and slider pinned together, [K_B/(M_B + M + Nm)]^(1/2)",
-        )
+        yield quantity("pinned_base_frequency", math.sqrt(slider.base.stiffness / mass))
     if slider.cantilever is not None:
         bending = slider.cantilever.bending_frequency
-        yield Quantity(
-            "bending_frequency", bending, "1/s", "lowest bending frequency of the cantilever"
-        )
+        yield quantity("bending_frequency", bending)
         ratio = bending / math.sqrt(slider.cantilever.stiffness / slider.cantilever.mass)
-        yield Quantity(
-            "bending_ratio", ratio, "1", "bending frequency over (K/M)^(1/2) of the cantilever"
-        )
+        yield quantity("bending_ratio", ratio)
     yield from _inertial_quantities(slider, config)
 
 
@@ -288,50 +286,15 @@ def _first_slip(slider: InertialSlider, config: Config, film: float) -> Iterator
     if not d_1:
         return
     loading = contacts.static_force / slider.spring_stiffness / config.drive_speed
-    yield Quantity(
-        "loading_time",
-        loading,
-        "s",
-        "time in which the spring alone loads to F_s, F_s/(K v_d); scale of the time between slips",
-    )
-    yield Quantity(
-        "D1",
-        d_1,
-        "1",
-        "velocity of the drive over the scale Omega_S F_s/K of slips, v_d (K M)^(1/2)/F_s (S46)",
-    )
+    yield quantity("loading_time", loading)
+    yield quantity("D1", d_1)
     alpha = (6 / d_1) ** (1 / 3)
-    yield Quantity(
-        "alpha",
-        alpha,
-        "1",
-        "duration of a slip in which contacts break one after another (S46), in 1/Omega_S: "
-        "(6/D1)^(1/3)",
-    )
-    yield Quantity(
-        "slip_time_sequential",
-        alpha / omega_s,
-        "s",
-        "duration of a slip in which contacts break one after another, alpha/Omega_S",
-    )
+    yield quantity("alpha", alpha)
+    yield quantity("slip_time_sequential", alpha / omega_s)
     # The peak of F(X) lies near F_s - Delta F_s, so D0 = F_d(X_c)/F_s is about 1 - delta.
     start = 1 - contacts.threshold.relative_width - film * d_1 / omega_s
-    yield Quantity(
-        "B",
-        start / 2,
-        "1",
-        "start of a slip in which the whole film melts at once (S47), where the spring force falls "
-        "by B F_s (Omega_S t)^2: (D0 - eta D1/Omega_S)/2, estimate with D0 = 1 - delta; mesoslip "
-        "onset computes D0",
-    )
+    yield quantity("B", start / 2)
     if start > 0:
         beta = math.sqrt(2 / start)
-        yield Quantity(
-            "beta",
-            beta,
-            "1",
-            "duration of such a slip, in 1/Omega_S: B^(-1/2)",
-        )
-        yield Quantity(
-            "slip_time_melting", beta / omega_s, "s", "duration of such a slip, beta/Omega_S"
-        )
+        yield quantity("beta", beta)
+        yield quantity("slip_time_melting", beta / omega_s)

@@ -20,33 +20,28 @@ from mesoslip.errors import ConfigError, Problem, RunError
 from mesoslip.output.inputs import ConfigLike, as_config
 from mesoslip.output.provenance import program_attributes
 from mesoslip.output.variables import ONSET
+from mesoslip.text_rows import named_meanings
 from mesoslip.theory.force_curve import ForceCurve
 
 # Units and meanings of the summary of the onset.
-SUMMARY = {
-    "stable": ("1", "whether K >= K*, so that slow sliding has no onset of slip"),
-    "K_star": ("N/m", "spring constant above which there is no onset"),
-    "X_c": ("m", "displacement at the onset"),
-    "D0": ("1", "F(X_c)/F_s"),
-    "D1": ("1", "v_d (K M)^(1/2)/F_s"),
-    "D2": ("1", "-(1/2) F''(X_c) F_s/K^2"),
-    "D3": ("1", "-(1/6) F'''(X_c) F_s^2/K^3"),
-    "alpha": (
-        "1",
-        "duration of a slip in which contacts break one after another (S46), in 1/Omega_S: "
-        "(6/D1)^(1/3)",
-    ),
-    "slip_time_sequential": ("s", "duration of such a slip, alpha/Omega_S"),
-    "B": (
-        "1",
-        "start of a slip in which the whole film melts at once (S47), where the spring force falls "
-        "by B F_s (Omega_S t)^2: (D0 - eta D1/Omega_S)/2",
-    ),
-    "beta": ("1", "duration of such a slip, in 1/Omega_S: B^(-1/2)"),
-    "slip_time_melting": ("s", "duration of such a slip, beta/Omega_S"),
-    "expansion_end": ("1", "x up to which the expansion S46 describes the contacts"),
-    "expansion_end_time": ("1", "tau = Omega_S (t - t_c) at that x"),
-}
+SUMMARY = named_meanings("""
+stable | 1 | whether K >= K*, so that slow sliding has no onset of slip
+K_star | N/m | spring constant above which there is no onset
+X_c | m | displacement at the onset
+D0 | 1 | F(X_c)/F_s
+D1 | 1 | v_d (K M)^(1/2)/F_s
+D2 | 1 | -(1/2) F''(X_c) F_s/K^2
+D3 | 1 | -(1/6) F'''(X_c) F_s^2/K^3
+alpha | 1 | duration of a slip in which contacts break one after another (S46), in 1/Omega_S:
+    (6/D1)^(1/3)
+slip_time_sequential | s | duration of such a slip, alpha/Omega_S
+B | 1 | start of a slip in which the whole film melts at once (S47), where the spring force falls by
+    B F_s (Omega_S t)^2: (D0 - eta D1/Omega_S)/2
+beta | 1 | duration of such a slip, in 1/Omega_S: B^(-1/2)
+slip_time_melting | s | duration of such a slip, beta/Omega_S
+expansion_end | 1 | x up to which the expansion S46 describes the contacts
+expansion_end_time | 1 | tau = Omega_S (t - t_c) at that x
+""")
 
 EQUATIONS = ("sequential", "melting")
 # S46 describes the contacts while its force differs by less than this fraction of F_s.

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mesoslip.analysis.power_spectrum import power_spectrum
+from mesoslip.analysis.even_traces import power_spectrum
 from mesoslip.array_types import Array
 
 # Relative tolerance of the frequency of a line.

@@ -13,9 +13,8 @@ from mesoslip.analysis.response.dataset import (
     write_csv,
 )
 from mesoslip.analysis.response.forces import creep_line, friction_line
-from mesoslip.analysis.response.holds import healing_line
+from mesoslip.analysis.response.holds import healing_line, steady_line
 from mesoslip.analysis.response.line import Line, line
-from mesoslip.analysis.response.steady import steady_line
 from mesoslip.analysis.response.tables import ResponseTable, force_scale, tables
 
 __all__ = [

@@ -35,11 +35,9 @@ from mesoslip.analysis.response.forces import (
     ramp_rows,
     restart_rows,
 )
-from mesoslip.analysis.response.holds import healing_line, hold_rows
+from mesoslip.analysis.response.holds import healing_line, hold_rows, steady_line, steady_rows
 from mesoslip.analysis.response.line import Line
-from mesoslip.analysis.response.load_steps import load_step_rows
-from mesoslip.analysis.response.steady import steady_line, steady_rows
-from mesoslip.analysis.response.steps import step_rows
+from mesoslip.analysis.response.steps import load_step_rows, step_rows
 from mesoslip.array_types import DataTree
 from mesoslip.configuration import arguments
 from mesoslip.errors import FileError

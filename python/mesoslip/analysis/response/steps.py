@@ -1,16 +1,17 @@
-"""Velocity steps: direct change, evolution, and relaxation displacement."""
+"""Steps of the velocity and of the normal load: direct change, evolution, relaxation."""
 
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from mesoslip.analysis.experiment_stages import Experiment, Peak, Stage
-from mesoslip.analysis.response.columns import STEPS, empty_row
-from mesoslip.analysis.response.decay import decay
-from mesoslip.analysis.steady_force import SteadyMean, error_of_mean
+from mesoslip.analysis.response.columns import LOAD_STEPS, STEPS, empty_row
+from mesoslip.analysis.response.line import decay
+from mesoslip.analysis.steady_force import SteadyMean, error_of_mean, steady_mean
+from mesoslip.array_types import Array
 from mesoslip.quantities import with_unit
 
 # Minimum height of a peak above the steady force, in standard deviations of the force.
@@ -148,4 +149,144 @@ def _fill_relaxation(
         )
     if math.isfinite(row["overshoot"]):
         return ["overshoots the steady force: not a single exponential"]
+    return []
+
+
+# Minimum change of the load from sample to sample in a step: over the load, and over the median of
+# such changes, which are those of the noise.
+MIN_CHANGE, MIN_OVER_NOISE = 0.02, 8.0
+# Samples without such a change that end a step.
+QUIET_SAMPLES = 3
+# Maximum deviation of the load from its medians before and after a step, over the step.
+MAX_DEVIATION = 0.1
+# Minimum samples before and after a step.
+MIN_SAMPLES = 16
+# Minimum transient change that is evaluated, in standard errors.
+MIN_TRANSIENT = 3.0
+
+
+class _Step(NamedTuple):
+    """Samples of a step of the load: from the start of the constant load before it to the end of
+    that after it, the last one before the step and the first one after it."""
+
+    start: int
+    before: int
+    after: int
+    end: int
+
+
+def load_step_rows(experiment: Experiment, number: int) -> list[dict[str, Any]]:
+    """Each step of the normal load in a stage of constant velocity.
+
+    A step of the load from L to L' changes the force at once by a direct part, and over a sliding
+    distance by a transient one. With the coefficient mu of steady sliding after the step, the force
+    just after it is L' (mu - alpha ln(L'/L)) (M. Linker and J. Dieterich, Journal of Geophysical
+    Research 97 (1992) 4923).
+    """
+    if experiment.normal_force is None:
+        return []
+    load = experiment.normal_force.mean(axis=0)
+    return [
+        _row(experiment, number, stage, load, step)
+        for stage in experiment.stages
+        if stage.is_steady
+        for step in _steps(load, experiment.samples(stage))
+    ]
+
+
+def _steps(load: Array, samples: slice) -> list[_Step]:
+    """Steps of the load between times of constant load."""
+    inside = load[samples]
+    if inside.size < 2 * MIN_SAMPLES or not np.isfinite(inside).all():
+        return []
+    change = np.abs(np.diff(inside))
+    limit = max(MIN_CHANGE * float(np.median(inside)), MIN_OVER_NOISE * float(np.median(change)))
+    jumps = np.flatnonzero(change > limit)
+    if not jumps.size:
+        return []
+    groups = np.split(jumps, np.flatnonzero(np.diff(jumps) > QUIET_SAMPLES) + 1)
+    firsts = [int(group[0]) for group in groups]
+    lasts = [int(group[-1]) + 1 for group in groups]
+    found = []
+    for start, before, after, end in zip(
+        [0, *lasts[:-1]], firsts, lasts, [*firsts[1:], inside.size - 1], strict=True
+    ):
+        levels = [inside[start : before + 1], inside[after : end + 1]]
+        size = abs(np.median(levels[1]) - np.median(levels[0]))
+        is_constant = all(np.ptp(one) < 2 * MAX_DEVIATION * size for one in levels)
+        if min(one.size for one in levels) >= MIN_SAMPLES and is_constant:
+            found.append(_Step(*(samples.start + one for one in (start, before, after, end))))
+    return found
+
+
+def _row(
+    experiment: Experiment, number: int, stage: Stage, load: Array, step: _Step
+) -> dict[str, Any]:
+    forces = stage.direction * experiment.force
+    first, last = load[step.start : step.before + 1], load[step.after : step.end + 1]
+    loads = float(np.median(first)), float(np.median(last))
+    row = empty_row(LOAD_STEPS, number, stage) | {
+        "load_step_time": float(experiment.time[step.before]),
+        "normal_force_before": loads[0],
+        "normal_force_after": loads[1],
+    }
+    before = steady_mean(forces[:, step.start : step.before + 1])
+    after = steady_mean(forces[:, step.after : step.end + 1])
+    if before is None or after is None:
+        return row | {"note": "too few samples before or after the step"}
+    at_once = forces[:, step.after]
+    start, start_error = float(at_once.mean()), error_of_mean(at_once, after)
+    transient_error = math.hypot(start_error, after.error)
+    row |= {
+        "force_before": before.mean,
+        "force_after": after.mean,
+        "direct_change": start - before.mean,
+        "direct_change_error": math.hypot(start_error, before.error),
+        "transient_change": after.mean - start,
+        "transient_change_error": transient_error,
+    }
+    notes = [] if before.is_steady and after.is_steady else ["not steady before or after the step"]
+    if min(loads) > 0:
+        scale = loads[1] * math.log(loads[1] / loads[0])
+        row |= {
+            "alpha": (after.mean - start) / scale,
+            "alpha_error": transient_error / abs(scale),
+        }
+    if experiment.is_stick_slip(stage):
+        notes.append("stick-slip: the force is not that of sliding")
+    elif abs(after.mean - start) < MIN_TRANSIENT * transient_error:
+        notes.append("no transient above the noise")
+    else:
+        notes += _fill_distances(experiment, stage, step, start, after.mean, row)
+    return row | {"note": "; ".join(notes)}
+
+
+def _fill_distances(
+    experiment: Experiment,
+    stage: Stage,
+    step: _Step,
+    start: float,
+    steady: float,
+    row: dict[str, Any],
+) -> list[str]:
+    """Fill the sliding distances of the transient; notes on them."""
+    samples = slice(step.after, step.end + 1)
+    force = stage.direction * experiment.force[:, samples].mean(axis=0)
+    displacement = stage.direction * experiment.displacement[:, samples].mean(axis=0)
+    displacement = displacement - displacement[0]
+    side = math.copysign(1.0, steady - start)
+    reached = np.flatnonzero(side * (force - steady) >= 0)
+    if not reached.size or reached[0] == 0:
+        return ["the steady force is not reached"]
+    last = int(reached[0])
+    part = (steady - force[last - 1]) / (force[last] - force[last - 1])
+    row["rise_displacement"] = float(
+        displacement[last - 1] + part * (displacement[last] - displacement[last - 1])
+    )
+    mean = steady_mean(force[None, :])
+    noise = 0.0 if mean is None else mean.standard_deviation
+    fit = decay(displacement, force, 1.0 if mean is None else mean.correlation, noise)
+    if fit is None:
+        return ["no exponential decay fits the transient"]
+    row["relaxation_displacement"], row["relaxation_displacement_error"] = fit
     return []

@@ -14,8 +14,8 @@ from mesoslip.configuration.config import Config
 from mesoslip.configuration.differences import flat, is_bookkeeping
 from mesoslip.configuration.keys import key_kind
 from mesoslip.errors import ConfigError, Problem
+from mesoslip.plots.axis import logarithmic
 from mesoslip.plots.key_names import name_of
-from mesoslip.plots.logarithmic import logarithmic
 from mesoslip.plots.style import BLUE
 from mesoslip.plots.views.base import Options, View
 from mesoslip.quantities import scale_for

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from mesoslip.array_types import Array, Dataset, DataTree
-from mesoslip.plots.logarithmic import logarithmic
+from mesoslip.plots.axis import logarithmic
 from mesoslip.plots.style import Canvas, canvas, legend_above, titles
 from mesoslip.plots.sweep_axis import DIRECTION_STYLES, SweptKey, scale_of
 from mesoslip.plots.views.base import Options, View

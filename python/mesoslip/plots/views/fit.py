@@ -11,8 +11,8 @@ from matplotlib.ticker import MaxNLocator
 
 from mesoslip.array_types import Array, Dataset, DataTree
 from mesoslip.output.access import trace_suffixes
+from mesoslip.plots.extent import max_size
 from mesoslip.plots.key_names import plain
-from mesoslip.plots.lines import max_size
 from mesoslip.plots.parameter_pairs import draw_pairs
 from mesoslip.plots.printing import current, is_narrow
 from mesoslip.plots.style import BLUE, Canvas, canvas, legend_above

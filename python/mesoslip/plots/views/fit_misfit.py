@@ -9,8 +9,8 @@ from matplotlib.axes import Axes
 
 from mesoslip.array_types import DataTree
 from mesoslip.output.access import trace_suffixes
+from mesoslip.plots.extent import max_size
 from mesoslip.plots.key_names import plain
-from mesoslip.plots.lines import max_size
 from mesoslip.plots.printing import is_narrow
 from mesoslip.plots.style import BLUE, RED, Canvas, canvas, legend_above
 from mesoslip.plots.views.base import Options, View

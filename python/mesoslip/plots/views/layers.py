@@ -14,8 +14,7 @@ from mesoslip.output.samples import times_of
 from mesoslip.plots.axis import HorizontalAxis, time_since
 from mesoslip.plots.close_up import largest_slip, slip_window
 from mesoslip.plots.curves import about_realizations, curve, draw_curves
-from mesoslip.plots.extent import Extent
-from mesoslip.plots.lines import max_size
+from mesoslip.plots.extent import Extent, max_size
 from mesoslip.plots.movie import Movie, chosen_frames, time_bar
 from mesoslip.plots.printing import is_narrow
 from mesoslip.plots.style import BLUE, SPRING, Canvas, canvas, legend_above, titles

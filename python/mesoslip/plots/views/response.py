@@ -12,8 +12,8 @@ from mesoslip.analysis.rate_and_state import MAX_MISFIT, Fit, fit_laws, records_
 from mesoslip.analysis.response import Line, healing_line, response_of, steady_line
 from mesoslip.errors import RunError
 from mesoslip.output.arrays import Arrays, Tree
+from mesoslip.plots.axis import logarithmic
 from mesoslip.plots.forced_response import draw_forced
-from mesoslip.plots.logarithmic import logarithmic
 from mesoslip.plots.measured_response import draw_measured, draw_measured_record
 from mesoslip.plots.printing import is_narrow
 from mesoslip.plots.response_record import draw_record, fit_label, title_record

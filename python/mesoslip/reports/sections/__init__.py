@@ -9,17 +9,11 @@ from mesoslip.output.arrays import Arrays
 from mesoslip.output.kinds import KINDS, kind_of
 from mesoslip.plots.views import takes_arrays as view_takes_arrays
 from mesoslip.reports.content import Writer
-from mesoslip.reports.sections.avalanches import avalanches
-from mesoslip.reports.sections.changes import changes
-from mesoslip.reports.sections.configuration import configuration
-from mesoslip.reports.sections.energy import energy, regime
-from mesoslip.reports.sections.methods import methods
+from mesoslip.reports.sections.catalogues import avalanches, slips, strokes
+from mesoslip.reports.sections.motion import energy, regime, response
+from mesoslip.reports.sections.origin import changes, configuration, methods, provenance
 from mesoslip.reports.sections.parameters import parameters, rates
 from mesoslip.reports.sections.pictures import pictures
-from mesoslip.reports.sections.provenance import provenance
-from mesoslip.reports.sections.response import response
-from mesoslip.reports.sections.slips import slips
-from mesoslip.reports.sections.strokes import strokes
 from mesoslip.reports.sections.sweep import maps, sweep
 from mesoslip.reports.sections.theory import curve, cycle, lyapunov, onset
 

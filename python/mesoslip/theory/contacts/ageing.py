@@ -12,10 +12,26 @@ from mesoslip.configuration.contacts.ageing import ageing_of
 from mesoslip.errors import ConfigError, Problem
 from mesoslip.theory.contacts.ageing_lives import lives, quadrature, steady_force
 from mesoslip.theory.contacts.base import ContactTheory
-from mesoslip.theory.quantity import Quantity
+from mesoslip.theory.quantity import Quantity, named_quantities
 
 if TYPE_CHECKING:
     from mesoslip.theory.linear_stability import LinearStability
+
+# Units and meanings of derived quantities.
+quantity = named_quantities("""
+young_static_force | N | force of all contacts at their mean thresholds when they attach
+young_relative_width | 1 | relative standard deviation of the thresholds at attachment, before draws
+    are rejected
+ageing_velocity | m/s | mean breaking stretch over the ageing time: in much slower sliding contacts
+    age fully before they break, in much faster sliding they stay young
+F_steady_young | N | force of stationary fast sliding, of young contacts, without delay and drag
+growth_per_decade | 1 | growth of thresholds per decade of age, relative to the threshold at birth
+mean_life | m | mean displacement from attaching to breaking, of old contacts
+F_steady | N | force of stationary slow sliding, of old contacts
+mean_life_drive | m | mean displacement from attaching to breaking, sliding at the drive's velocity
+F_steady_drive | N | force of stationary sliding at the drive's velocity, with ageing, delay and
+    drag
+""")
 
 NO_FORCE_CURVE = (
     "has no force curve: F(X) depends on how fast the slider moves; that of contacts with the "
@@ -98,63 +114,20 @@ class AgeingTheory(ContactTheory):
         contacts, ageing = self.config.contacts, ageing_of(self.config)
         width = contacts.threshold.relative_width
         weakest, mean, strongest = ageing.threshold([1 - width, 1.0, 1 + width], width, 0.0)
-        yield Quantity(
-            "young_static_force",
-            contacts.static_force * float(mean),
-            "N",
-            "force of all contacts at their mean thresholds when they attach",
-        )
-        yield Quantity(
-            "young_relative_width",
-            float((strongest - weakest) / (2 * mean)),
-            "1",
-            "relative standard deviation of the thresholds at attachment, before draws are "
-            "rejected",
-        )
-        yield Quantity(
-            "ageing_velocity",
-            contacts.break_stretch / ageing.time,
-            "m/s",
-            "mean breaking stretch over the ageing time: in much slower sliding contacts age fully "
-            "before they break, in much faster sliding they stay young",
-        )
+        yield quantity("young_static_force", contacts.static_force * float(mean))
+        yield quantity("young_relative_width", float((strongest - weakest) / (2 * mean)))
+        yield quantity("ageing_velocity", contacts.break_stretch / ageing.time)
         if ageing.growth is not None:
-            yield Quantity(
-                "growth_per_decade",
-                ageing.growth * math.log(10),
-                "1",
-                "growth of thresholds per decade of age, relative to the threshold at birth",
-            )
+            yield quantity("growth_per_decade", ageing.growth * math.log(10))
         else:
-            yield Quantity(
-                "mean_life",
-                self.mean_life(0.0),
-                "m",
-                "mean displacement from attaching to breaking, of old contacts",
-            )
+            yield quantity("mean_life", self.mean_life(0.0))
 
     def _steady_quantities(self) -> Iterator[Quantity]:
         """Forces of slow and fast sliding, and at the drive's velocity."""
         if ageing_of(self.config).growth is None:
-            slow = "force of stationary slow sliding, of old contacts"
-            yield Quantity("F_steady", self.steady_force(0.0), "N", slow)
-        yield Quantity(
-            "F_steady_young",
-            self.steady_force(math.inf),
-            "N",
-            "force of stationary fast sliding, of young contacts, without delay and drag",
-        )
+            yield quantity("F_steady", self.steady_force(0.0))
+        yield quantity("F_steady_young", self.steady_force(math.inf))
         speed = self.config.drive_speed
         if speed > 0:
-            yield Quantity(
-                "mean_life_drive",
-                self.mean_life(speed),
-                "m",
-                "mean displacement from attaching to breaking, sliding at the drive's velocity",
-            )
-            yield Quantity(
-                "F_steady_drive",
-                self.steady_force(speed),
-                "N",
-                "force of stationary sliding at the drive's velocity, with ageing, delay and drag",
-            )
+            yield quantity("mean_life_drive", self.mean_life(speed))
+            yield quantity("F_steady_drive", self.steady_force(speed))

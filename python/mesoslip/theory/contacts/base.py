@@ -9,11 +9,23 @@ from typing import TYPE_CHECKING, ClassVar, NoReturn
 from mesoslip.array_types import DataTree
 from mesoslip.errors import ConfigError, Problem
 from mesoslip.quantities import with_unit
-from mesoslip.theory.quantity import Quantity
+from mesoslip.theory.quantity import Quantity, named_quantities
 
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
     from mesoslip.theory.linear_stability import LinearStability
+
+# Units and meanings of derived quantities.
+quantity = named_quantities("""
+contact_static_force | N | mean static threshold of a contact, f_s = F_s/N
+contact_stiffness | N/m | mean stiffness of a contact, k
+break_stretch | m | mean stretch at which a contact breaks, f_s/k
+K_star_estimate | N/m | estimate of K*, above which slow sliding without delay is stable, Nk (f_s -
+    f_b)/Delta f_s (S48); mesoslip curve computes K*, which depends on the threshold law
+contact_mass | kg | mass of a contact, m = rho (A/N) h
+contact_spacing | m | distance between neighbours, a = (A/N)^(1/2)
+contact_radius | m | radius of a contact
+""")
 
 # Keys whose effect every theory has, or states as a limit of its own. A key that is not here and
 # not among the features of a theory is one that it does not know.
@@ -120,39 +132,22 @@ class ContactTheory:
         """Quantities that contacts of all known kinds have."""
         contacts = self.config.contacts
         static, stiffness = contacts.contact_static_force, contacts.contact_stiffness
-        yield Quantity(
-            "contact_static_force", static, "N", "mean static threshold of a contact, f_s = F_s/N"
-        )
-        yield Quantity("contact_stiffness", stiffness, "N/m", "mean stiffness of a contact, k")
-        yield Quantity(
-            "break_stretch",
-            contacts.break_stretch,
-            "m",
-            "mean stretch at which a contact breaks, f_s/k",
-        )
+        yield quantity("contact_static_force", static)
+        yield quantity("contact_stiffness", stiffness)
+        yield quantity("break_stretch", contacts.break_stretch)
         if contacts.contact_mass > 0:
-            yield Quantity(
-                "contact_mass", contacts.contact_mass, "kg", "mass of a contact, m = rho (A/N) h"
-            )
+            yield quantity("contact_mass", contacts.contact_mass)
         if contacts.area is not None:
             area = contacts.area / contacts.count
-            spacing = "distance between neighbours, a = (A/N)^(1/2)"
-            yield Quantity("contact_spacing", math.sqrt(area), "m", spacing)
-            yield Quantity("contact_radius", math.sqrt(area / math.pi), "m", "radius of a contact")
+            yield quantity("contact_spacing", math.sqrt(area))
+            yield quantity("contact_radius", math.sqrt(area / math.pi))
         yield Quantity(
             "threshold_acceptance",
             contacts.threshold.probability_above(contacts.min_threshold),
             "1",
             "probability that a drawn threshold exceeds the back force" + self._ages,
         )
-        yield Quantity(
-            "K_star_estimate",
-            self.K_star_estimate,
-            "N/m",
-            "estimate of K*, above which slow sliding without delay is stable, "
-            "Nk (f_s - f_b)/Delta f_s (S48); mesoslip curve computes K*, which depends on the "
-            "threshold law",
-        )
+        yield quantity("K_star_estimate", self.K_star_estimate)
 
     # Ages of contacts whose thresholds have to exceed the back force, in words.
     _ages: ClassVar[str] = ""

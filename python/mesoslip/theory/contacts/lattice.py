@@ -8,10 +8,16 @@ from typing import TYPE_CHECKING, ClassVar
 from mesoslip.configuration.contacts.lattice import lattice_of
 from mesoslip.theory.contacts.base import ContactTheory
 from mesoslip.theory.contacts.plain import PlainTheory
-from mesoslip.theory.quantity import Quantity
+from mesoslip.theory.quantity import Quantity, named_quantities
 
 if TYPE_CHECKING:
     from mesoslip.theory.linear_stability import LinearStability
+
+# Units and meanings of derived quantities.
+quantity = named_quantities("""
+bond_stiffness | N/m | stiffness between neighbours, G = 3 xi f_s/a
+bond_ratio | 1 | stiffness of all bonds of a contact over its own, G z/k
+""")
 
 # Quantities of contacts without neighbours.
 WITHOUT_NEIGHBOURS = ("K_star_estimate", "mean_life", "F_steady", "F_steady_drive")
@@ -34,12 +40,5 @@ class LatticeTheory(PlainTheory):
             yield one._replace(meaning=f"{one.meaning}; without interaction") if is_without else one
         contacts, lattice = self.config.contacts, lattice_of(self.config)
         bond = lattice.bond_stiffness(contacts)
-        yield Quantity(
-            "bond_stiffness", bond, "N/m", "stiffness between neighbours, G = 3 xi f_s/a"
-        )
-        yield Quantity(
-            "bond_ratio",
-            lattice.neighbours * bond / contacts.contact_stiffness,
-            "1",
-            "stiffness of all bonds of a contact over its own, G z/k",
-        )
+        yield quantity("bond_stiffness", bond)
+        yield quantity("bond_ratio", lattice.neighbours * bond / contacts.contact_stiffness)

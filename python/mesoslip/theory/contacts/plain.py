@@ -9,10 +9,17 @@ from mesoslip.errors import ConfigError, Problem
 from mesoslip.theory.contacts.base import ContactTheory
 from mesoslip.theory.delays import drag_impulse
 from mesoslip.theory.lives import newborn_stretch, scales
-from mesoslip.theory.quantity import Quantity
+from mesoslip.theory.quantity import Quantity, named_quantities
 
 if TYPE_CHECKING:
     from mesoslip.theory.linear_stability import LinearStability
+
+# Units and meanings of derived quantities.
+quantity = named_quantities("""
+mean_life | m | mean displacement from attaching to breaking, <x_s - x_b>
+F_steady | N | force of stationary slow sliding
+F_steady_drive | N | force of stationary sliding at the drive's velocity, with delay and drag
+""")
 
 
 class PlainTheory(ContactTheory):
@@ -46,22 +53,14 @@ class PlainTheory(ContactTheory):
             return
         lives = scales(config, newborn_width)
         mean_life = lives.mean_life * contacts.break_stretch
-        yield Quantity(
-            "mean_life",
-            mean_life,
-            "m",
-            "mean displacement from attaching to breaking, <x_s - x_b>",
-        )
+        yield quantity("mean_life", mean_life)
         if not contacts.reattach:
             return
         steady = lives.steady_force * contacts.static_force
-        yield Quantity("F_steady", steady, "N", "force of stationary slow sliding")
+        yield quantity("F_steady", steady)
         speed = config.drive_speed
         if speed > 0 and not config.slider.ignores_delay:
             drag = lives.mean_mass * drag_impulse(config, speed) * speed
-            yield Quantity(
-                "F_steady_drive",
-                (steady * mean_life + drag) / (mean_life + speed * contacts.delay),
-                "N",
-                "force of stationary sliding at the drive's velocity, with delay and drag",
+            yield quantity(
+                "F_steady_drive", (steady * mean_life + drag) / (mean_life + speed * contacts.delay)
             )

@@ -72,11 +72,7 @@ class SteadySliding(LinearStability):
         relative_width=arguments.number(0, is_open=True),
     )
     def __init__(
-        self,
-        config: Config,
-        velocity: float | None = None,
-        *,
-        relative_width: float | None = None,
+        self, config: Config, velocity: float | None = None, *, relative_width: float | None = None
     ) -> None:
         super().__init__(config, velocity)
         self.relative_width = relative_width or config.contacts.threshold.relative_width

@@ -19,11 +19,30 @@ from mesoslip.configuration.contacts.thermal import thermal_of
 from mesoslip.errors import ConfigError, Problem
 from mesoslip.theory.contacts.base import ContactTheory
 from mesoslip.theory.contacts.thermal_lives import ThermalAgeingLives, ThermalLives
-from mesoslip.theory.quantity import Quantity
+from mesoslip.theory.quantity import Quantity, named_quantities
 
 if TYPE_CHECKING:
     from mesoslip.theory.contacts.thermal_holds import Restart
     from mesoslip.theory.contacts.thermal_sliding import ThermalSliding
+
+# Units and meanings of derived quantities.
+quantity = named_quantities("""
+activation_force_ratio | 1 | force scale of activation over f_s, f_T/f_s
+newborn_break_rate | 1/s | rate at which a contact of mean threshold breaks that bears the back
+    force
+activation_velocity | m/s | omega_0 f_T/k: in much faster sliding contacts reach their thresholds
+F_steady_drive | N | force of stationary sliding at the drive's velocity, with activation, delay and
+    drag
+F_steady_slope | N | dF/d ln v of stationary sliding at the drive's velocity, a - b: below zero
+    sliding weakens with velocity
+direct_effect | N | a of rate and state: N f_T of the pinned contacts, and the drag of the detached
+evolution_effect | N | b of rate and state: a - dF/d ln v
+slip_distance | m | D_c: displacement over which the force evolves after a small velocity step
+creep_velocity | m/s | velocity of steady creep under the force of the drive, that of the first
+    stage
+critical_stiffness_estimate | N/m | Rice and Ruina's K_c = ((b - a)/D_c)(1 + M v^2/(a D_c)) at the
+    drive's velocity: with softer springs steady sliding is unstable
+""")
 
 
 # Velocities between which creep is sought, over that of activation, ω_0 f_T/k, and their number.
@@ -134,78 +153,31 @@ class ThermalTheory(ContactTheory):
         yield from self.common_quantities()
         contacts, thermal = self.config.contacts, thermal_of(self.config)
         static = contacts.contact_static_force
-        yield Quantity(
-            "activation_force_ratio",
-            thermal.ratio(static),
-            "1",
-            "force scale of activation over f_s, f_T/f_s",
-        )
-        yield Quantity(
-            "newborn_break_rate",
-            thermal.rate_under(contacts.back_force_ratio, static),
-            "1/s",
-            "rate at which a contact of mean threshold breaks that bears the back force",
-        )
-        yield Quantity(
-            "activation_velocity",
-            self._activation_velocity,
-            "m/s",
-            "omega_0 f_T/k: in much faster sliding contacts reach their thresholds",
-        )
+        yield quantity("activation_force_ratio", thermal.ratio(static))
+        yield quantity("newborn_break_rate", thermal.rate_under(contacts.back_force_ratio, static))
+        yield quantity("activation_velocity", self._activation_velocity)
         if contacts.newborn_width > 0 or not contacts.reattach:
             return
         if self.config.drive_speed > 0:
             yield from self._steady_quantities(self.config.drive_speed)
         force = self.config.drive.first_force
         if force > 0:
-            yield Quantity(
-                "creep_velocity",
-                self.creep_velocity(force),
-                "m/s",
-                "velocity of steady creep under the force of the drive, that of the first stage",
-            )
+            yield quantity("creep_velocity", self.creep_velocity(force))
 
     def _steady_quantities(self, speed: float) -> Iterator[Quantity]:
         """Friction and its rate and state at the velocity of the drive [m/s]."""
-        yield Quantity(
-            "F_steady_drive",
-            self.steady_force(speed),
-            "N",
-            "force of stationary sliding at the drive's velocity, with activation, delay and drag",
-        )
-        yield Quantity(
-            "F_steady_slope",
-            self.steady_slope(speed),
-            "N",
-            "dF/d ln v of stationary sliding at the drive's velocity, a - b: below zero sliding "
-            "weakens with velocity",
-        )
+        yield quantity("F_steady_drive", self.steady_force(speed))
+        yield quantity("F_steady_slope", self.steady_slope(speed))
         try:
             found = self.sliding(speed).rate_and_state
         except ConfigError:
             return
-        yield Quantity(
-            "direct_effect",
-            found.a,
-            "N",
-            "a of rate and state: N f_T of the pinned contacts, and the drag of the detached",
-        )
-        yield Quantity("evolution_effect", found.b, "N", "b of rate and state: a - dF/d ln v")
-        yield Quantity(
-            "slip_distance",
-            found.slip_distance,
-            "m",
-            "D_c: displacement over which the force evolves after a small velocity step",
-        )
+        yield quantity("direct_effect", found.a)
+        yield quantity("evolution_effect", found.b)
+        yield quantity("slip_distance", found.slip_distance)
         mass = getattr(self.config.slider, "mass", None)
         if found.b > found.a and mass is not None and 0 < self.config.spring_stiffness < math.inf:
-            yield Quantity(
-                "critical_stiffness_estimate",
-                found.critical_stiffness(speed, mass),
-                "N/m",
-                "Rice and Ruina's K_c = ((b - a)/D_c)(1 + M v^2/(a D_c)) at the drive's velocity: "
-                "with softer springs steady sliding is unstable",
-            )
+            yield quantity("critical_stiffness_estimate", found.critical_stiffness(speed, mass))
 
 
 class ThermalAgeingTheory(ThermalTheory):

@@ -10,10 +10,16 @@ from mesoslip.array_types import DataTree
 from mesoslip.errors import ConfigError
 from mesoslip.theory.contacts.base import ContactTheory
 from mesoslip.theory.contacts.plain import PlainTheory
-from mesoslip.theory.quantity import Quantity
+from mesoslip.theory.quantity import Quantity, named_quantities
 
 if TYPE_CHECKING:
     from mesoslip.theory.linear_stability import LinearStability
+
+# Units and meanings of derived quantities.
+quantity = named_quantities("""
+track_force_deviation | N | standard deviation of the force of slow sliding along the track, linear
+    in its spread
+""")
 
 
 class TrackTheory(PlainTheory):
@@ -47,10 +53,4 @@ class TrackTheory(PlainTheory):
         except ConfigError:
             return
         if math.isfinite(deviation):
-            yield Quantity(
-                "track_force_deviation",
-                deviation,
-                "N",
-                "standard deviation of the force of slow sliding along the track, linear in its "
-                "spread",
-            )
+            yield quantity("track_force_deviation", deviation)

@@ -1,38 +1,47 @@
-"""Catalogues of slips: statistics, distributions, rows."""
+"""Catalogues of slips, strokes and avalanches: statistics, distributions, rows."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from mesoslip.analysis.slips import Catalogue, as_recorded, catalogue_of, counts, printed_counts
+from mesoslip.analysis import avalanches as sizes
+from mesoslip.analysis.slips import (
+    HEADS,
+    Catalogue,
+    as_recorded,
+    catalogue_of,
+    counts,
+    printed_counts,
+)
+from mesoslip.analysis.strokes import has_rotation, output_pieces, strokes_of
+from mesoslip.errors import FileError
 from mesoslip.output.access import group_of
-from mesoslip.plots.lines import max_size
+from mesoslip.plots.extent import max_size
 from mesoslip.plots.style import curve_color
-from mesoslip.quantities import scale_for
+from mesoslip.quantities import column, scale_for
 from mesoslip.reports.content import Block, Section, Subject, Table, Text, drawn
-from mesoslip.reports.sections.base import columns_in_one_unit, named, row_in_one_unit
+from mesoslip.reports.sections.base import (
+    columns_in_one_unit,
+    named,
+    picture_of,
+    picture_of_all,
+    row_in_one_unit,
+)
 
 # Maximum number of rows of a catalogue on a page.
-MAX_ROWS = 60
+MAX_SLIPS = 60
 # Bins of a histogram.
 BINS = 24
 
-# Columns of the catalogue: header, and SI unit.
-COLUMNS = {
-    "force_before": ("force before", "N"),
-    "force_after": ("force after", "N"),
-    "force_drop": ("force drop", "N"),
-    "peak_velocity": ("peak velocity", "m/s"),
-    "contacts_broken": ("breaks", "1"),
-    "duration": ("duration", "s"),
-    "waiting_time": ("waiting time", "s"),
-    "loading_stiffness": ("loading stiffness", "N/m"),
-    "creep_share": ("creep share", "1"),
-}
+# Columns on a page, but for the start.
+COLUMNS = (
+    *("force_before", "force_after", "force_drop", "peak_velocity", "contacts_broken"),
+    *("duration", "waiting_time", "loading_stiffness", "creep_share"),
+)
 # Columns of which there are histograms.
 DISTRIBUTIONS = ("force_drop", "duration", "waiting_time")
 COUNTS_NOTE = (
@@ -62,7 +71,7 @@ def slips(subjects: Sequence[Subject]) -> Section | None:
     if any(group_of(one.tree, "slips").sizes["slip"] > 1 for one in with_slips):
         blocks.append(drawn("Distributions of the slips", lambda: _histograms(with_slips, found)))
     if len(subjects) == 1:
-        blocks += _rows(found[0])
+        blocks += _first_rows(found[0])
     return Section("Slips", tuple(blocks))
 
 
@@ -86,15 +95,15 @@ def _statistics(subjects: Sequence[Subject], subject: Subject, catalogue: Catalo
 
 def _columns(catalogue: Catalogue) -> dict[str, tuple[str, str]]:
     """Header and unit of each column of an output."""
-    return {name: as_recorded(*one, catalogue.force_unit) for name, one in COLUMNS.items()}
+    return {name: as_recorded(*HEADS[name], catalogue.force_unit) for name in COLUMNS}
 
 
-def _rows(catalogue: Catalogue) -> list[Block]:
+def _first_rows(catalogue: Catalogue) -> list[Block]:
     """The first rows of a catalogue."""
     rows = catalogue.rows
     if not rows:
         return []
-    shown = rows[:MAX_ROWS]
+    shown = rows[:MAX_SLIPS]
     columns = [("realization", [float(row["realization_index"]) for row in shown], "1", 4)]
     columns.append(("start", [row["start_time"] for row in shown], "s", 7))
     # A measured trace has no breaks.
@@ -103,7 +112,7 @@ def _rows(catalogue: Catalogue) -> list[Block]:
         for name, (header, unit) in _columns(catalogue).items()
         if any(row[name] is not None for row in shown)
     ]
-    note = f"The first {MAX_ROWS} of {len(rows)} slips." if len(rows) > MAX_ROWS else ""
+    note = f"The first {MAX_SLIPS} of {len(rows)} slips." if len(rows) > MAX_SLIPS else ""
     return [Table(*columns_in_one_unit(columns), note)]
 
 
@@ -138,3 +147,71 @@ def _histograms(subjects: Sequence[Subject], catalogues: Sequence[Catalogue]) ->
     if len(subjects) > 1:
         figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower left", ncols=3)
     return figure
+
+
+# Maximum number of strokes or cycles on a page.
+MAX_STROKES = 20
+
+
+def strokes(subjects: Sequence[Subject]) -> Section | None:
+    """Friction, loops, offset and stiffness of strokes and cycles."""
+    blocks: list[Block] = []
+    for subject in subjects:
+        try:
+            if output_pieces(subject.tree)[0] is None and not has_rotation(subject.tree):
+                continue
+            found = strokes_of(subject.tree, name=subject.name)
+        except FileError:
+            # A record without a whole stroke, or without samples.
+            continue
+        blocks += [
+            Text(named(subjects, subject, f"{one[:1].upper()}{one[1:]}.")) for one in found.notes
+        ]
+        for table in reversed(found.tables):
+            rows = table.rows[:MAX_STROKES]
+            note = (
+                f"The first {MAX_STROKES} of {len(table.rows)}."
+                if len(table.rows) > MAX_STROKES
+                else ""
+            )
+            blocks += [Text(f"{table.title}:"), Table(table.head, rows, note)]
+        caption = "Loops, mean friction of each stroke, and friction over position and stroke"
+        blocks.append(picture_of(subjects, subject, caption, "strokes"))
+    return Section("Strokes", tuple(blocks)) if blocks else None
+
+
+DIGITS = 5
+
+
+def avalanches(subjects: Sequence[Subject]) -> Section | None:
+    """The sizes of avalanches: statistics and distribution."""
+    with_avalanches = [one for one in subjects if "avalanches" in one.tree.children]
+    if not with_avalanches:
+        return None
+    blocks: list[Block] = []
+    for subject in with_avalanches:
+        statistics = sizes.avalanche_summary(subject.tree)
+        if len(subjects) > 1:
+            blocks.append(Text(subject.name))
+        warning = sizes.warning(statistics)
+        if warning is not None:
+            blocks.append(Text(f"Warning: {warning}.", warns=True))
+        blocks.append(Table(("quantity", "value", "meaning"), _quantities(statistics)))
+    full = [one for one in with_avalanches if group_of(one.tree, "avalanches").sizes["avalanche"]]
+    if full:
+        blocks.append(picture_of_all(full, "Distribution of the sizes", "avalanches"))
+    return Section("Avalanches", tuple(blocks))
+
+
+def _quantities(statistics: Mapping[str, float | None]) -> tuple[tuple[str, ...], ...]:
+    """Name, value with its error, and meaning of each quantity."""
+    errors = {f"{name}_error" for name in statistics} & set(statistics)
+    rows = []
+    for name, value in statistics.items():
+        if name in errors:
+            continue
+        unit, meaning = sizes.SUMMARY[name]
+        shown = column([value], unit, DIGITS)
+        text = shown.text(value, statistics.get(f"{name}_error"))
+        rows.append((shown.head(name), text, meaning))
+    return tuple(rows)

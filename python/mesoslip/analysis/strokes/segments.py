@@ -95,13 +95,20 @@ def output_pieces(tree: Tree, realization: int = 0) -> tuple[tuple[Piece, ...] |
     )
     # Forces are missing after the end of an interrupted run only.
     known = np.isfinite(force)
-    motion = tomllib.loads(tree.attrs.get("trace", "")).get("trace", {}).get("motion")
+    motion = given_motion(tree)
     return record_pieces(root["time"].values[known], force[known], drive, displacement, motion)
+
+
+def given_motion(tree: Tree) -> str | None:
+    """The motion that was given as the trace was read."""
+    found: str | None = tomllib.loads(tree.attrs.get("trace", "")).get("trace", {}).get("motion")
+    return found
 
 
 def back_and_forth(count: int, name: str) -> str:
     """A sentence about a record that was cut by a quantity into a number of pieces."""
-    text = f"goes back and forth, with {count - 1} reversals; slips are those between them"
+    reversals = "1 reversal" if count == 2 else f"{count - 1} reversals"
+    text = f"goes back and forth, with {reversals}; slips are those between them"
     if name != FORCE:
         return text
     return (

@@ -60,7 +60,9 @@ def fit(
     predictions: Annotated[
         int | None,
         typer.Option(
-            help="Number of traces with --predict, at least 50; 60 by default", metavar="NUMBER"
+            min=50,
+            help="Number of traces with --predict, at least 50; 60 by default",
+            metavar="NUMBER",
         ),
     ] = None,
     workers: Annotated[int | None, workers_option("simulations")] = None,
@@ -76,6 +78,8 @@ def fit(
     if compare:
         _print_scores(outputs, as_json=as_json)
         return
+    from mesoslip.output import targets
+
     *traces, config = outputs
     if predict is not None and config.suffix == ".nc" and not traces:
         target = posterior or config.with_name(f"{config.stem}.{predict.stem}.nc")
@@ -83,10 +87,12 @@ def fit(
         return
     check_arguments(traces, config, predict)
     path = posterior or Path("out") / f"{traces[0].stem}.posterior.nc"
+    if predict is not None:
+        target = path.with_name(f"{path.stem}.{predict.stem}.nc")
+        targets.check_output(target, [*traces, config, predict])
     tree = _fitted(traces, config, path, changes or (), workers, quiet=quiet)
     _print(tree, as_json=as_json and predict is None)
     if predict is not None:
-        target = path.with_name(f"{path.stem}.{predict.stem}.nc")
         _predict(path, predict, target, predictions, workers, quiet=quiet, as_json=as_json)
 
 
@@ -231,6 +237,8 @@ def check_arguments(traces: Sequence[Path], config: Path, predict: Path | None =
                     f"{config}: the fit {traces[0]} has its configuration; leave this one out: "
                     f"mesoslip fit {traces[0]} --predict {predict}"
                 )
+        # What is wrong with it is said before the fit.
+        files.read_run(predict)
 
 
 def _print_rows(rows: Sequence[Row], attributes: Mapping[Any, Any]) -> None:

@@ -91,7 +91,8 @@ class Plateaus:
         moving = int(np.sum(self.columns["is_steady"] == 0))
         if moving:
             found.append(f"in {moving} the friction still changes: the mean is not that of a state")
-        if not np.isfinite(self.columns["mean_friction_coefficient"]).any():
+        has_force = self.force_unit == "N"
+        if has_force and not np.isfinite(self.columns["mean_friction_coefficient"]).any():
             found.append("no coefficients: the normal force is unknown (trace --normal-force)")
         return found
 

@@ -100,6 +100,7 @@ ARGUMENTS = {
     "saved": lambda wrong: mesoslip.Realization(CONFIG).restore(wrong, {}),
     "find_multipliers": lambda wrong: mesoslip.cycle(CONFIG, find_multipliers=wrong),
     "estimates_errors": lambda wrong: mesoslip.Realization(CONFIG, estimates_errors=wrong),
+    "laws": lambda wrong: mesoslip.response_posterior("none.nc", laws=wrong),
     "letters": lambda wrong: mesoslip.plot("none.nc", letters=wrong),
     "view": lambda wrong: mesoslip.plot("none.nc", view=wrong),
     "title": lambda wrong: mesoslip.plot("none.nc", title=wrong),
@@ -109,7 +110,7 @@ ARGUMENTS = {
 # Those for which a value that is wrong elsewhere is right.
 RIGHT = {
     *(("tables", dict), ("changes", dict), ("update", dict), ("rate", complex)),
-    *((name, np.ndarray) for name in ("overrides", "probability", "threshold", "rate")),
+    *((name, np.ndarray) for name in ("overrides", "probability", "threshold", "rate", "laws")),
 }
 
 

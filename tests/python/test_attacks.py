@@ -121,6 +121,20 @@ def test_inputs_and_devices_are_not_overwritten(arguments, short, tmp_path, comm
     assert Path("/dev/null").is_char_device()
 
 
+@pytest.mark.parametrize("name", ["other", "other.nc", "new.nc"])
+@pytest.mark.parametrize("arguments", [("slips", "in.nc", "--csv"), ("report", "in.nc", "-o")])
+def test_no_table_or_page_takes_the_place_of_an_output(
+    arguments, name, tmp_path, command, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    for one in ("in.nc", "other", "other.nc"):
+        Path(one).write_bytes(OLD.read_bytes())
+    status, _, printed = command(*arguments, name)
+    assert status == 2
+    assert "is an output of mesoslip" in printed or "is the name of an output" in printed
+    assert {one.read_bytes() for one in tmp_path.iterdir()} == {OLD.read_bytes()}
+
+
 def test_links_of_outputs_are_followed(short, tmp_path, command):
     """Also to an earlier output, which is replaced; to no other file, not even to a new one that
     another program may execute."""

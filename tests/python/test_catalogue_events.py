@@ -128,6 +128,14 @@ def test_command_and_messages(trace, command, tmp_path):
     data = json.loads(command("events", path, "--of", "slips", "--json")[1])
     assert len(data["events"]) == 20
     command("events", path, "--csv", tmp_path / "a.csv")
+    for option, value, words in (
+        ("--completeness", "nan", "completeness = nan: must be a finite number"),
+        ("--main-size", "inf", "main_size = inf: must be a finite number of at least 0"),
+        ("--threshold", "3", "threshold = 3.0: is that of the channel, and these events are slips"),
+    ):
+        status, _, err = command("events", path, "--of", "slips", option, value)
+        assert status == 2
+        assert words in err
     assert len((tmp_path / "a.csv").read_text().splitlines()) == 11
     with pytest.raises(ConfigError, match="must be one of slips, avalanches, channel"):
         mesoslip.events(path, "bursts")

@@ -424,6 +424,9 @@ def test_what_has_no_cycle(command, tmp_path, change, words):
     [
         ("slider.stifness=100N/m:200N/m:3", ["did you mean 'slider.stiffness'"]),
         ("slider.stiffness=100N/m:200N/m", ["KEY=FROM:TO:POINTS"]),
+        ("slider.stiffness=100N/m:200N/m:²", ["KEY=FROM:TO:POINTS"]),
+        ("slider.stiffness=100N/m:200N/m:1000000000", ["too many points"]),
+        ("nothing=1:2:3", ["unknown key"]),
         ("slider.stiffness=200N/m:100N/m:3", ["slider.stiffness", "ascending"]),
         ("contacts.count=100:200:3", ["contacts.count", "must be one of"]),
     ],

@@ -238,6 +238,7 @@ def test_damaged_files_give_no_wrong_numbers(tmp_path, number):
         ("Normal stress (kN)", "normal_force", "kN"),
         ("COF [%]", "friction", "%"),
         ("DAQ.Fx (N)", "force", "N"),
+        ("Ff (N)", "force", "N"),
         ("DAQ.COF", "friction", None),
     ],
 )

@@ -192,6 +192,12 @@ def test_command_tables_and_picture(disc, command, tmp_path):
     path = tmp_path / "disc.nc"
     write(disc[1], path)
     assert "5 plateaus between steps of the sliding speed" in command("plateaus", path)[1]
+    table = tmp_path / "coefficients.csv"
+    rows = (f"{0.01 * at:.2f},{1 + at // 1000},{0.3 + at % 7 / 1000:.3f}" for at in range(3000))
+    table.write_text("time [s],speed [mm/s],COF\n" + "\n".join(rows) + "\n")
+    assert plateaus_of(mesoslip.read_trace(table)).notes == [
+        "3 plateaus between steps of the sliding speed"
+    ]
     data = json.loads(command("plateaus", path, "--json", "--viscosity", "45 mPa*s")[1])
     assert data["plateaus"][-1]["hersey_number"] == pytest.approx(0.045 * 2 / LOAD, rel=1e-2)
     assert r"\toprule" in command("plateaus", path, "--latex")[1]

@@ -440,7 +440,7 @@ def test_the_motion_is_that_of_every_command(tmp_path) -> None:  # type: ignore[
     tree = mesoslip.read_trace(path, motion="strokes")
     assert mesoslip.strokes(tree)["cycles"]["mean_friction"].values == pytest.approx(1, abs=0.02)
     assert tree["slips"].sizes["slip"] == 0
-    with pytest.raises(mesoslip.FileError, match="does not go back and forth"):
+    with pytest.raises(mesoslip.FileError, match="was read as one-way; read it again with"):
         mesoslip.strokes(mesoslip.read_trace(path, motion="one-way"))
     np.savetxt(path, np.c_[time, 3 + rng.random(1000)], delimiter=",", header=header, comments="")
     with pytest.raises(mesoslip.ConfigError, match="no reversals that stand out"):

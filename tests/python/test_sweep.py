@@ -664,6 +664,9 @@ def sometimes(tree):
 
 def text(tree):
     return "much"
+
+def leaves(tree):
+    raise SystemExit(3)
 '''
 
 
@@ -706,10 +709,11 @@ def test_failures_are_listed_and_not_fatal(tmp_path, sweep_file, command):
     assert data.attrs["failures"].count("too much") == 2
     status, _, printed = command("sweep", path, "-o", output, "--pool", "threads")
     assert (status, "0 points computed, 2 read from the store, 2 failed" in printed) == (1, True)
-    path = sweep_file(SIMPLE.replace("mean_force", "own.py:text"))
-    status, _, printed = command("sweep", path, "-o", tmp_path / "text.nc")
-    assert status == 1
-    assert "returned 'much', not a number" in printed
+    for name, words in (("text", "returned 'much', not a number"), ("leaves", "SystemExit: 3")):
+        path = sweep_file(SIMPLE.replace("mean_force", f"own.py:{name}"))
+        status, _, printed = command("sweep", path, "-o", tmp_path / f"{name}.nc")
+        assert status == 1
+        assert words in printed
 
 
 WRONG = {
@@ -740,6 +744,7 @@ WRONG = {
         "need lists of one length: contacts.delay has 2, slider.mass has 1"
     ),
     '[[sweep.together]]\n"slider.mass" = [1]\n[sweep.grid]\n"slider.mass" = [2]': "varied twice",
+    32 * '[[sweep.together]]\n"slider.mass" = [1]\n': "has 32 axes",
     '[sweep.latin_hypercube]\npoints = 0\n"slider.mass" = { from = 1, to = 2 }': "at least 1",
     "[sweep.latin_hypercube]\npoints = 3": "names no keys to vary",
     '[sweep.grid]\n"slider.stiffness" = [97, -97]': (

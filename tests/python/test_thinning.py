@@ -74,7 +74,7 @@ def test_slow_signals_stay_and_fast_ones_do_not_alias(name, tmp_path):
     # 18 Hz at 20 Hz would look like 2 Hz: without it, the record is the slow sine alone.
     slow = 5 + np.sin(2 * np.pi * 2.0 * tree["time"].values)
     assert tree["spring_force"].values[0][50:-50] == pytest.approx(slow[50:-50], abs=2e-3)
-    assert "thinned: every 50th of 30000 lines, 20 Hz" in tree.attrs["understood"]
+    assert "thinned: one of every 50 of 30000 lines, 20 Hz" in tree.attrs["understood"]
 
 
 def test_blocks_make_no_difference(monkeypatch, tmp_path):
@@ -117,7 +117,7 @@ def test_binary_files_are_read_block_by_block(name, tmp_path, monkeypatch):
     assert steps[:-2] == [(2, 4000), "thinned"] * 7
     for one in ("time", "spring_force"):
         np.testing.assert_allclose(tree[one].values, expected[one].values, rtol=1e-9, atol=1e-9)
-    assert "thinned: every 50th of 30000 rows, 20 Hz" in tree.attrs["understood"]
+    assert "thinned: one of every 50 of 30000 rows, 20 Hz" in tree.attrs["understood"]
 
 
 @pytest.mark.usefixtures("small_blocks")

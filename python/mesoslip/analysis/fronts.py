@@ -22,7 +22,7 @@ from mesoslip.output.variables import FRONTS, Group, Meaning
 from mesoslip.quantities import column, number, with_error
 from mesoslip.simulation.fronts import ARRESTED, ARRESTS, KINDS, PRECURSOR
 
-NO_FRONTS = 'the output has no fronts: they are recorded with slider.kind = "interface"'
+NO_FRONTS = 'no fronts: they are recorded with slider.kind = "interface"'
 
 # Types of fronts: those that stop on the way, those of a known speed, and all others. Slow ones are
 # slower than this part of the velocity of sound.
@@ -222,7 +222,7 @@ def _table(
 def fronts_of(tree: Tree, name: str = "the output", realization: int | None = None) -> Fronts:
     """The fronts of all realizations of an output, or of one."""
     if "fronts" not in tree.children:
-        raise FileError(f"{name}: {NO_FRONTS}")
+        raise FileError(f"{name} has {NO_FRONTS}")
     slider = config_of(tree, name).slider
     data = group_of(tree, "fronts")
     columns = {one: np.asarray(data[one].values) for one in FRONTS}

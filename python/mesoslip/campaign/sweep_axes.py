@@ -22,6 +22,9 @@ from mesoslip.configuration.messages import problems
 from mesoslip.configuration.units import to_si
 from mesoslip.errors import ConfigError, Problem
 
+# Maximum number of axes: NumPy's arrays may have 32 dimensions.
+MAX_AXES = 31
+
 Wanted = TypeVar("Wanted", Range, Extent)
 
 
@@ -40,6 +43,12 @@ def axes_of(sweep: SweepTable, source: str) -> tuple[Axis, ...]:
             if count > 1:
                 values = described(dict(zip(axis.keys, row, strict=True)))
                 reader.refuse("sweep", f"{values} is given {count} times")
+    if len(axes) > MAX_AXES:
+        message = (
+            f"has {len(axes)} axes, and arrays have at most {MAX_AXES} besides the realizations; "
+            "[[sweep.together]] varies several keys along one"
+        )
+        reader.refuse("sweep", message)
     if reader.problems:
         raise ConfigError(reader.problems)
     return axes

@@ -113,7 +113,7 @@ def measured(run: RunView, measure: Measure) -> float:
         )
     except MemoryError:
         raise
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         where = f" ({measure.path}{_line(error, measure.path)})" if measure.path else ""
         raise RunError(f"measure {measure.name}{where}: {type(error).__name__}: {error}") from error
     if not isinstance(value, Real):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -32,6 +33,8 @@ if TYPE_CHECKING:
 
 # Significant digits.
 DIGITS = 5
+# Maximum number of values of a key; each takes seconds.
+MAX_POINTS = 10_000
 # Meanings for a motion that is irregular.
 IRREGULAR = {
     "period": ("s", "mean time between passages of the section"),
@@ -120,18 +123,20 @@ def _values(text: str) -> tuple[str, list[float]]:
     key, _, span = text.partition("=")
     parts = span.split(":")
     kind = key_kind(key)
-    near = [] if kind is not None else nearest_keys(key)
-    if near:
-        message = f"has an unknown key; did you mean {near[0]!r}?"
-        raise ConfigError([Problem("", "--continue", message, text)])
-    if kind is None or len(parts) != 3 or not parts[2].isdigit() or int(parts[2]) < 2:
-        message = "must be KEY=FROM:TO:POINTS, such as drive.velocity=0.1um/s:10um/s:20"
+    points = int(parts[2]) if re.fullmatch("[0-9]{1,18}", parts[-1]) and len(parts) == 3 else 0
+    message = "must be KEY=FROM:TO:POINTS, such as drive.velocity=0.1um/s:10um/s:20"
+    if kind is None and span:
+        near = nearest_keys(key)
+        message = "has an unknown key" + (f"; did you mean {near[0]!r}?" if near else "")
+    elif points > MAX_POINTS:
+        message = f"has too many points; the maximum is {MAX_POINTS}"
+    if kind is None or not 2 <= points <= MAX_POINTS:
         raise ConfigError([Problem("", "--continue", message, text)])
     low, high = (
         quantity(part, "--continue", kind.unit or "1", kind.example, positive=True)
         for part in parts[:2]
     )
-    return key, np.geomspace(low, high, int(parts[2])).tolist()
+    return key, np.geomspace(low, high, points).tolist()
 
 
 def _print_branches(data: Dataset, key: str) -> None:

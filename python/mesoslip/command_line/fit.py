@@ -56,7 +56,8 @@ def fit(
         bool, typer.Option("--compare", help="Compare fits of the same traces by their predictions")
     ] = False,
     predictions: Annotated[
-        int | None, option("Number of traces with --predict, at least 50; 60 by default", "NUMBER")
+        int | None,
+        option("Number of traces with --predict, at least 50; 60 by default", "NUMBER", min=50),
     ] = None,
     workers: Annotated[int | None, workers_option("simulations")] = None,
     quiet: QuietOption = False,
@@ -71,6 +72,8 @@ def fit(
     if compare:
         _print_scores(outputs, as_json=as_json)
         return
+    from mesoslip.output import targets
+
     *traces, config = outputs
     if predict is not None and config.suffix == ".nc" and not traces:
         target = posterior or config.with_name(f"{config.stem}.{predict.stem}.nc")
@@ -78,10 +81,12 @@ def fit(
         return
     check_arguments(traces, config, predict)
     path = posterior or Path("out") / f"{traces[0].stem}.posterior.nc"
+    if predict is not None:
+        target = path.with_name(f"{path.stem}.{predict.stem}.nc")
+        targets.check_output(target, [*traces, config, predict])
     tree = _fitted(traces, config, path, changes or (), workers, quiet=quiet)
     _print(tree, as_json=as_json and predict is None)
     if predict is not None:
-        target = path.with_name(f"{path.stem}.{predict.stem}.nc")
         _predict(path, predict, target, predictions, workers, quiet=quiet, as_json=as_json)
 
 
@@ -226,6 +231,8 @@ def check_arguments(traces: Sequence[Path], config: Path, predict: Path | None =
                     f"{config}: the fit {traces[0]} has its configuration; leave this one out: "
                     f"mesoslip fit {traces[0]} --predict {predict}"
                 )
+        # What is wrong with it is said before the fit.
+        files.read_run(predict)
 
 
 def _print_rows(rows: Sequence[Row], attributes: Mapping[Any, Any]) -> None:

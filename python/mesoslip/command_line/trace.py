@@ -11,7 +11,7 @@ import typer
 
 from mesoslip.command_line.options import SavedOption, counted, option, workers_option
 from mesoslip.command_line.progress import progress_shown, say, steps_shown
-from mesoslip.errors import ConfigError, Problem
+from mesoslip.errors import ConfigError, FileError, Problem
 
 if TYPE_CHECKING:
     from mesoslip.array_types import DataTree
@@ -191,6 +191,8 @@ def _read_each(
     description, measurements = batch.described(files)
     pieces = batch.pieces_of(measurements, folder, description, options)
     targets.check_writable(table, files)
+    if folder == table or (folder.exists() and not folder.is_dir()):
+        raise FileError(f"{folder}: is a file; outputs of a batch need the name of a folder (-o)")
     with stopped_by_signals() as stop, progress_shown(False, "reading") as progress:
         rows = batch.read_pieces(pieces, stop, executor=workers, progress=progress)
     table_files.write_table(rows, batch.COLUMNS, table)

@@ -171,6 +171,14 @@ text = instance(str, "a text")
 table = instance(Mapping, "nested tables")
 
 
+def texts(value: Any) -> tuple[str, ...]:
+    """A text, or several."""
+    found = (value,) if isinstance(value, str) else value
+    if not isinstance(found, Iterable) or not all(isinstance(one, str) for one in found):
+        raise ValueError("must be a text, or several")
+    return tuple(found)
+
+
 def changes(value: Any) -> tuple[Any, ...]:
     wanted = 'must be changes such as "contacts.delay=1ms", or tables, in a list'
     if isinstance(value, str | bytes | Mapping) or not isinstance(value, Iterable):

@@ -63,6 +63,7 @@ class Origin:
 
 
 @arguments.checked(
+    laws=arguments.texts,
     samples=arguments.whole(100),
     seed=arguments.whole(0),
     free_stiffness=arguments.flag,
@@ -127,7 +128,7 @@ def response_posterior(
     >>> found["posterior"]["slip_distance"].dims
     ('chain', 'draw')
     """
-    laws = list(dict.fromkeys([laws] if isinstance(laws, str) else laws))
+    laws = list(dict.fromkeys(laws))
     unknown = [one for one in laws if one not in LAWS]
     if unknown:
         choice = ", ".join(repr(one) for one in LAWS)

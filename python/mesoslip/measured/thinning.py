@@ -27,6 +27,8 @@ MAX_EVERY = 10**6
 BETA, CUTOFF = 8.0, 0.75
 # Minimum interval of a gap over the usual one, and maximum share of gaps.
 MIN_GAP, MAX_GAPS = 1.5, 0.01
+# Rounding errors of times, over the interval of the samples that are kept.
+ROUNDING = 1e-9
 
 
 def thinned(
@@ -72,7 +74,7 @@ def thinned(
     parts.append(thinner.finish())
     kept = _joined([one for one in parts if one is not None])
     note = (
-        f"thinned: every {every}th of {thinner.count} {first.row}s, "
+        f"thinned: one of every {every} of {thinner.count} {first.row}s, "
         f"{number(1 / (every * interval * time.size), 5)} Hz, after a low-pass that is flat up to "
         f"{number(1 / (4 * every * interval * time.size), 3)} Hz"
     )
@@ -209,4 +211,7 @@ class _Thinner:
                 total = np.concatenate([[0], np.cumsum(missing)])
                 low, high = centres - every // 2, centres + (every + 1) // 2
                 column[2 * (total[high] - total[low]) > every] = np.nan
+        # The sum of the filter has rounding errors at a time of 0.
+        time = found[self.time]
+        time[np.abs(time) < ROUNDING * every * self.step] = 0.0
         return found, lines[centres]

@@ -54,6 +54,8 @@ def check_output(path: Path | None, reads: Iterable[str | Path] = ()) -> None:
 def _check(path: Path, reads: Iterable[str | Path], *, is_output: bool) -> None:
     if path.suffix == ".toml":
         raise FileError(f"{path}: is the name of a configuration; give the output another name")
+    if path.suffix == ".nc" and not is_output:
+        raise FileError(f"{path}: is the name of an output; give the file another name")
     target = _target(path, is_output=is_output)
     for one in map(Path, reads):
         if target.exists() and one.exists() and target.samefile(one):
@@ -72,7 +74,7 @@ def _target(path: Path, *, is_output: bool) -> Path:
     """The path at which a file is written; other objects are refused.
 
     An output replaces nothing but another one, also through a link. Other files replace those of
-    their name, but none to which a link leads.
+    their name, but no output, and none to which a link leads.
     """
     if is_directory(path):
         raise FileError(f"{path}: cannot be written: is a directory; give the name of a file in it")
@@ -88,6 +90,8 @@ def _target(path: Path, *, is_output: bool) -> Path:
         raise FileError(f"{path}: cannot be written: is not a regular file")
     if is_output and not is_empty and not _is_output(target):
         problem = f"{link or 'exists'}, and is not an output of mesoslip"
+    elif not is_output and not is_empty and _is_output(target):
+        problem = "exists, and is an output of mesoslip"
     elif link and not is_output and not is_empty:
         problem = link
     # Another program may execute the file.

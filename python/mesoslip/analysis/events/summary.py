@@ -13,8 +13,9 @@ import numpy as np
 from mesoslip.analysis.events.channel import CHANNEL, Emissions, emissions_of
 from mesoslip.analysis.events.laws import BValue, Omori, b_value, omori
 from mesoslip.array_types import Array
+from mesoslip.configuration import arguments
 from mesoslip.configuration.arguments import check_choice
-from mesoslip.errors import FileError
+from mesoslip.errors import ConfigError, FileError, Problem
 from mesoslip.output.access import group_of
 from mesoslip.output.arrays import Tree
 from mesoslip.output.inputs import OutputLike, opened_run_arrays
@@ -146,6 +147,9 @@ class EventSummary:
         }
 
 
+@arguments.checked(
+    threshold=arguments.number(0), completeness=arguments.number(), main_size=arguments.number(0)
+)
 def events_of(
     tree: Tree,
     catalogue: str | None = None,
@@ -159,6 +163,9 @@ def events_of(
     if catalogue is None:
         catalogue = "avalanches" if "avalanches" in tree.children else "slips"
         catalogue = "channel" if CHANNEL in tree.data_vars else catalogue
+    if threshold is not None and catalogue != "channel":
+        message = f"is that of the channel, and these events are {catalogue}"
+        raise ConfigError([Problem("", "threshold", message, threshold)])
     emissions = None
     times = tree.to_dataset()["time"].values
     record = float(times[-1] - times[0])

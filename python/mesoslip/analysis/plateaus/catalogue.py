@@ -84,11 +84,13 @@ class Plateaus:
     def notes(self) -> list[str]:
         """Sentences on what was found, with guesses."""
         guess = "guess: " if self.source == FORCE else ""
-        found = [f"{guess}{len(self.rows)} plateaus between steps of the {self.source}"]
+        count = f"{len(self.rows)} plateau{'s' * (len(self.rows) != 1)}"
+        found = [f"{guess}{count} between steps of the {self.source}"]
         moving = int(np.sum(self.columns["is_steady"] == 0))
         if moving:
             found.append(f"in {moving} the friction still changes: the mean is not that of a state")
-        if not np.isfinite(self.columns["mean_friction_coefficient"]).any():
+        has_force = self.force_unit == "N"
+        if has_force and not np.isfinite(self.columns["mean_friction_coefficient"]).any():
             found.append("no coefficients: the normal force is unknown (trace --normal-force)")
         return found
 

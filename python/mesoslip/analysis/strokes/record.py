@@ -9,7 +9,14 @@ from functools import cached_property
 import numpy as np
 
 from mesoslip.analysis.noise import noise_level, without_impulses
-from mesoslip.analysis.strokes.segments import FORCE, POSITIONS, Piece, given_in, output_pieces
+from mesoslip.analysis.strokes.segments import (
+    FORCE,
+    ONE_WAY,
+    POSITIONS,
+    Piece,
+    given_in,
+    output_pieces,
+)
 from mesoslip.analysis.strokes.sliding import polarity
 from mesoslip.array_types import Array
 from mesoslip.errors import FileError
@@ -107,6 +114,8 @@ def record_of(tree: Tree, realization: int = 0, name: str = "the output") -> Str
     """A realization of an output as a record of strokes."""
     pieces, source = output_pieces(tree, realization)
     if pieces is None:
+        if given_in(tree, "motion") == ONE_WAY:
+            raise FileError(f"{name}: was read as one-way; read it again with --motion strokes")
         raise FileError(
             f"{name}: does not go back and forth: the {source} has no reversals"
             if source != FORCE

@@ -113,7 +113,8 @@ def given_in(tree: Tree, key: str) -> str | None:
 
 def back_and_forth(count: int, name: str) -> str:
     """A sentence about a record that was cut by a quantity into a number of pieces."""
-    text = f"goes back and forth, with {count - 1} reversals; slips are those between them"
+    reversals = "1 reversal" if count == 2 else f"{count - 1} reversals"
+    text = f"goes back and forth, with {reversals}; slips are those between them"
     if name != FORCE:
         return text
     return (

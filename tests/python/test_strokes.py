@@ -375,6 +375,25 @@ def test_view_and_report_of_strokes() -> None:
     assert report_section([Subject("made", record_tree(phases(), x + 2))]) is None
 
 
+def test_revolutions_are_drawn_one_by_one() -> None:
+    """Without a line from the end of a revolution back to the start of the next one."""
+    time = np.arange(0, 12.2, 0.01)
+    force = 2 + 0.5 * np.sin(2 * np.pi * 0.8 * time)
+    figure = mesoslip.plot(record_tree(time, force, revolutions=0.8 * time), view="strokes")
+    for line in figure.axes[0].lines:
+        steps = np.diff(line.get_xdata())
+        assert (steps[np.isfinite(steps)] >= 0).all()
+
+
+def test_colours_of_a_map_are_those_of_sliding() -> None:
+    """A reversal of a tenth of the stroke, beside friction that varies by 4 %."""
+    x = np.sin(2 * np.pi * phases())
+    force = elastic_sliding(x, 10.0) * (1 + 0.04 * x)
+    figure = mesoslip.plot(record_tree(phases(), force, drive_displacement=x), view="strokes")
+    low, high = figure.axes[2].collections[0].get_clim()
+    assert 0.95 < low < high < 1.05
+
+
 def test_revolutions_of_a_disc() -> None:
     """Means of friction that varies with the angle; the angle from a count, a speed or a period."""
     time = np.arange(0, 12.2, 0.01)

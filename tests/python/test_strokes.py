@@ -475,6 +475,10 @@ def test_the_period_of_revolutions_is_found() -> None:
     force += 0.1 * rng.standard_normal(time.size)
     assert found_period(time, force) == pytest.approx(0.9234, rel=1e-3)
     assert found_period(time, rng.standard_normal(time.size)) is None
+    # Of a few samples, with a strong second harmonic, over many periods.
+    turn = math.tau * 1.99 * np.arange(0, 200, 0.02)
+    wave = 0.1 * np.sin(turn + 1) + 0.3 * np.sin(2 * turn) + 0.05 * rng.standard_normal(turn.size)
+    assert found_period(np.arange(0, 200, 0.02), wave) == pytest.approx(1 / 1.99, rel=1e-4)
     found = strokes_of(record_tree(time, force), period="auto")
     assert found.notes[0].startswith("guess: a revolution takes 923")
     with pytest.raises(mesoslip.FileError, match="does not repeat"):

@@ -96,15 +96,23 @@ def found_period(time: Array, force: Array) -> float | None:
     if not peaks.size or correlation[peaks].max() < MIN_CORRELATION:
         return None
     first = int(peaks[correlation[peaks] > 0.9 * correlation[peaks].max()][0])
-    # The last multiple of it has the smallest relative error.
-    times = lags.size // first - 1
-    last = max(1, times) * first
-    near = slice(max(first, last - first // 4), last + first // 4 + 1)
-    last = near.start + int(np.argmax(correlation[near]))
-    left, middle, right = correlation[last - 1 : last + 2] if last + 1 < lags.size else (0, 1, 0)
+    # Multiples of it have smaller relative errors, by which larger ones are found.
+    lag, times = _peak(correlation, first, first // 4), 1
+    while times < (last := int((lags.size - 1) / lag - 0.5)):
+        times = min(2 * times, last)
+        lag = _peak(correlation, round(times * lag), first // 4) / times
+    return lag * interval
+
+
+def _peak(correlation: Array, near: int, reach: int) -> float:
+    """Lag of the maximum near a lag, of a parabola through three samples."""
+    start = max(1, near - reach)
+    at = start + int(np.argmax(correlation[start : near + reach + 1]))
+    if at + 1 >= correlation.size:
+        return float(at)
+    left, middle, right = correlation[at - 1 : at + 2].tolist()
     bend = left - 2 * middle + right
-    shift = 0.5 * (left - right) / bend if bend < 0 else 0.0
-    return (last + shift) * interval / max(1, times)
+    return at + (0.5 * (left - right) / bend if bend < 0 else 0.0)
 
 
 def _angle(tree: Tree, realization: int, time: Array, period: float | None) -> tuple[Array, str]:

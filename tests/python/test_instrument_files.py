@@ -77,7 +77,25 @@ DATED = "Date\tTime\tElapsed Time (s)\tCharge normale (N)\tFriction (N)\n" + "".
     f"04/03/2026\t16:10:{int(t):02d}\t{t:.1f}\t{LOAD}\t{f:.4f}\n"
     for t, f in zip(TIME, FORCE, strict=True)
 )
+TRIBOX = (
+    "TRIBOX 4.5\r\nNormal load : 20.00 [N]\r\nFrequency : 0.25 [Hz]\r\n\r\n"
+    "Time [s]\tAmplitude [mm]\tFt [N]\tµ\r\n" + rows(TIME, X, FORCE, FORCE / LOAD)
+)
+RTEC = "Rtec Instruments\nTest,A\n\nTimestamp,Step,Z Pos (mm),Fx (N),Fz (N),COF\n" + rows(
+    TIME, 1 + 0 * X, X, FORCE, -LOAD + 0 * X, FORCE / LOAD, between=","
+)
+SRV = "Optimol SRV 5;;\nVersuch;17;\nZeit;Reibkraft;Weg\ns;N;mm\n" + rows(
+    TIME, FORCE, X, between=";", decimal=","
+)
+DEWESOFT = (
+    "Data\n\nStart time: 3/4/2026 14:05:07.000\nNumber of channels: 2\nSample rate: 2\n\n"
+    "Time (s)\tF_t (N)\tF_n (N)\n" + rows(TIME, FORCE, LOAD + 0 * X)
+)
 TEXTS = {
+    "Anton Paar": (TRIBOX, {}),
+    "Rtec": (RTEC, {}),
+    "Optimol SRV": (SRV, {}),
+    "Dewesoft": (DEWESOFT, {}),
     "LabVIEW (.lvm)": (LABVIEW, {}),
     "LabVIEW without comments, with units": (
         LABVIEW.replace("\t\n", "\n")

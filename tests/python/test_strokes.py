@@ -421,6 +421,26 @@ def test_revolutions_of_a_disc() -> None:
         mesoslip.strokes(record_tree(time[::300], force[::300], revolutions=0.8 * time[::300]))
 
 
+def test_falls_of_the_track_of_a_disc_are_no_slips(tmp_path) -> None:  # type: ignore[no-untyped-def]
+    """Two waves in a revolution, at a speed that is recorded with an error of 1 %; slips between
+    which the disc turns by any angle are slips."""
+    rng = np.random.default_rng(5)
+    time = np.arange(0, 200, 0.02)
+    turn = math.tau * 1.99 * time
+    waves = 2 + 0.1 * np.sin(turn + 1) + 0.3 * np.sin(2 * turn)
+    saw = 2 - 0.3 * ((time / 0.7123) % 1 > 0.9) + 0.5 * ((time / 0.7123) % 1)
+    for force, is_track in ((waves, True), (saw, False)):
+        table = np.transpose([time, force + 0.05 * rng.standard_normal(time.size)])
+        rows = "".join(f"{at:.2f},{one:.4f},{60 * 1.99 * 1.01:.2f}\n" for at, one in table)
+        file = tmp_path / "disc.csv"
+        file.write_text("time [s],force [N],rotation speed [rpm]\n" + rows)
+        tree = mesoslip.read_trace(file)
+        text = "falls keep the phase of the rotation, and are those of the track"
+        assert (text in tree.attrs.get("comment", "")) == is_track
+        assert (tree["slips"].sizes["slip"] == 0) == is_track
+    assert mesoslip.read_trace(file, min_fall=0.3)["slips"].sizes["slip"] > 0
+
+
 def test_a_file_of_a_disc(tmp_path) -> None:  # type: ignore[no-untyped-def]
     """A clock beside a time, forces without unit beside a coefficient, and revolutions."""
     rows = [f"16:10:{at:02d}\t{at}\t{0.5 * at}\t9,5\t0,{200 + at % 3}" for at in range(60)]

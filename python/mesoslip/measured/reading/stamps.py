@@ -116,6 +116,11 @@ class Clock:
         self.first = ""
         self._start = self._last = self._days = 0
 
+    @property
+    def start(self) -> float:
+        """The first time stamp [s]."""
+        return self._start / 1e9
+
     def seconds(self, cell: str) -> float | None:
         """Seconds of a cell; None if it is not a time stamp."""
         found = STAMP.fullmatch(cell)

@@ -73,6 +73,10 @@ MTS = (
     "Time\tShear Displacement\tShear Force\tNormal Force\nSec\tmm\tkN\tkN\n"
     + rows(TIME, X, 1e-3 * FORCE, 1e-3 * LOAD + 0 * X, form="{:.7f}")
 )
+DURATIONS = "Time\tStep Time\tTest Time\tSpeed\tFriction Force\tFriction Coefficient\n" + "".join(
+    f"16:10:{int(t):02d}\t{30 if t < 4 else 3600}\t{t:.1f}\t65\t{f:.2f}\t{f / LOAD:.5f}\n"
+    for t, f in zip(TIME, FORCE, strict=True)
+)
 DATED = "Date\tTime\tElapsed Time (s)\tCharge normale (N)\tFriction (N)\n" + "".join(
     f"04/03/2026\t16:10:{int(t):02d}\t{t:.1f}\t{LOAD}\t{f:.4f}\n"
     for t, f in zip(TIME, FORCE, strict=True)
@@ -103,6 +107,7 @@ TEXTS = {
         .replace("Force (N)", "Force"),
         {},
     ),
+    "duration of the step among the times": (DURATIONS, {}),
     "clock of whole seconds beside the elapsed time": (DATED, {}),
     "oscilloscope of Tektronix": (TEKTRONIX, {"columns": "time [s], force [N]"}),
     "PicoScope": (PICOSCOPE, {"columns": "time [ms], force [mN]"}),

@@ -383,7 +383,8 @@ def trace_of(understood: Understood) -> DataTree:
 
 def _are_of_track(record: Record, found: FoundSlips) -> bool:
     """Whether the falls of a record are those of the track of a disc."""
-    if record.revolutions is None and record.rotation_speed is None:
+    known = record.rotation_speed if record.revolutions is None else record.revolutions
+    if known is None or not np.isfinite(known).any():
         return False
     angle = angle_of(record.time, record.revolutions, record.rotation_speed)
     return are_of_track(found, record.time, angle)

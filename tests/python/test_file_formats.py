@@ -122,6 +122,8 @@ def test_the_order_of_a_date_is_that_of_the_only_possible_one(form, tmp_path):
     # From April to May; in the other order from November back to August.
     assert chosen_order(["11/04/2026", "08/05/2026"]) == Chosen("dmy")
     assert chosen_order(["04/11/2026", "05/08/2026"]) == Chosen("mdy")
+    # A damaged date is named where it is read.
+    assert chosen_order(["99/99/2026", "04/11/2026", "05/08/2026"]) == Chosen("mdy")
 
 
 @pytest.mark.parametrize("form", ["%d/%m/%Y %H:%M", "%m/%d/%Y %H:%M", "%y-%m-%d %H:%M"])

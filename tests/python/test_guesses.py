@@ -63,6 +63,12 @@ WRONG = {
         {"missing": "-99.99, 0"},
         lambda guessed, right: right.force.size == guessed.force.size - 1,
     ),
+    "rounded times of samples that follow each other otherwise": (
+        ("time [s],force [N]", [str(n // 4) for n in range(COUNT)], FORCE),
+        "guess: times are rounded to 1 s, with up to 4 samples to each; they are spread evenly",
+        {"headers": "-, force [N]", "rate": "10 Hz"},
+        lambda guessed, right: (guessed.time[-1], right.time[-1]) == (9.75, 3.9),
+    ),
     "the part of a file": (
         ("time [s],force [N]", TIME[:15] + TIME[: COUNT - 15], FORCE),
         "guess: the clock starts again: 2 parts (1 lines 2 to 16; 2 lines 17 to 41); part 2",

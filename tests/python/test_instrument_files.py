@@ -73,11 +73,33 @@ MTS = (
     "Time\tShear Displacement\tShear Force\tNormal Force\nSec\tmm\tkN\tkN\n"
     + rows(TIME, X, 1e-3 * FORCE, 1e-3 * LOAD + 0 * X, form="{:.7f}")
 )
+DURATIONS = "Time\tStep Time\tTest Time\tSpeed\tFriction Force\tFriction Coefficient\n" + "".join(
+    f"16:10:{int(t):02d}\t{30 if t < 4 else 3600}\t{t:.1f}\t65\t{f:.2f}\t{f / LOAD:.5f}\n"
+    for t, f in zip(TIME, FORCE, strict=True)
+)
 DATED = "Date\tTime\tElapsed Time (s)\tCharge normale (N)\tFriction (N)\n" + "".join(
     f"04/03/2026\t16:10:{int(t):02d}\t{t:.1f}\t{LOAD}\t{f:.4f}\n"
     for t, f in zip(TIME, FORCE, strict=True)
 )
+TRIBOX = (
+    "TRIBOX 4.5\r\nNormal load : 20.00 [N]\r\nFrequency : 0.25 [Hz]\r\n\r\n"
+    "Time [s]\tAmplitude [mm]\tFt [N]\tµ\r\n" + rows(TIME, X, FORCE, FORCE / LOAD)
+)
+RTEC = "Rtec Instruments\nTest,A\n\nTimestamp,Step,Z Pos (mm),Fx (N),Fz (N),COF\n" + rows(
+    TIME, 1 + 0 * X, X, FORCE, -LOAD + 0 * X, FORCE / LOAD, between=","
+)
+SRV = "Optimol SRV 5;;\nVersuch;17;\nZeit;Reibkraft;Weg\ns;N;mm\n" + rows(
+    TIME, FORCE, X, between=";", decimal=","
+)
+DEWESOFT = (
+    "Data\n\nStart time: 3/4/2026 14:05:07.000\nNumber of channels: 2\nSample rate: 2\n\n"
+    "Time (s)\tF_t (N)\tF_n (N)\n" + rows(TIME, FORCE, LOAD + 0 * X)
+)
 TEXTS = {
+    "Anton Paar": (TRIBOX, {}),
+    "Rtec": (RTEC, {}),
+    "Optimol SRV": (SRV, {}),
+    "Dewesoft": (DEWESOFT, {}),
     "LabVIEW (.lvm)": (LABVIEW, {}),
     "LabVIEW without comments, with units": (
         LABVIEW.replace("\t\n", "\n")
@@ -85,6 +107,7 @@ TEXTS = {
         .replace("Force (N)", "Force"),
         {},
     ),
+    "duration of the step among the times": (DURATIONS, {}),
     "clock of whole seconds beside the elapsed time": (DATED, {}),
     "oscilloscope of Tektronix": (TEKTRONIX, {"columns": "time [s], force [N]"}),
     "PicoScope": (PICOSCOPE, {"columns": "time [ms], force [mN]"}),

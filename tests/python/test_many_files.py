@@ -44,6 +44,17 @@ def test_parts_are_the_whole(folder, second):
     assert guessed == (second == "again.txt")
 
 
+def test_dates_of_parts_have_the_time_between_them(folder):
+    """A pause of an hour; in dates of one day each, whose order is not known, a guess."""
+    for date, is_known in (("2026-03-04", True), ("04/03/2026", False)):
+        for name, hour in (("c", 12), ("d", 13)):
+            rows = [f"{date} {hour}:00:{n:02d}\t{2 + n % 3}" for n in range(40)]
+            (folder / f"{name}.txt").write_text("\n".join(["time\tforce [N]", *rows, ""]))
+        record = understand([folder / "c.txt", folder / "d.txt"]).record
+        assert record.time[40] == (3600 if is_known else 40)
+        assert ("guess: the clock of d.txt" in "\n".join(record.report)) != is_known
+
+
 def test_a_description_names_parts_and_the_output_repeats_them(folder):
     description = folder / "test.toml"
     description.write_text('[trace]\nfile = ["a.txt", "b.txt"]\n')

@@ -375,6 +375,25 @@ def test_view_and_report_of_strokes() -> None:
     assert report_section([Subject("made", record_tree(phases(), x + 2))]) is None
 
 
+def test_revolutions_are_drawn_one_by_one() -> None:
+    """Without a line from the end of a revolution back to the start of the next one."""
+    time = np.arange(0, 12.2, 0.01)
+    force = 2 + 0.5 * np.sin(2 * np.pi * 0.8 * time)
+    figure = mesoslip.plot(record_tree(time, force, revolutions=0.8 * time), view="strokes")
+    for line in figure.axes[0].lines:
+        steps = np.diff(line.get_xdata())
+        assert (steps[np.isfinite(steps)] >= 0).all()
+
+
+def test_colours_of_a_map_are_those_of_sliding() -> None:
+    """A reversal of a tenth of the stroke, beside friction that varies by 4 %."""
+    x = np.sin(2 * np.pi * phases())
+    force = elastic_sliding(x, 10.0) * (1 + 0.04 * x)
+    figure = mesoslip.plot(record_tree(phases(), force, drive_displacement=x), view="strokes")
+    low, high = figure.axes[2].collections[0].get_clim()
+    assert 0.95 < low < high < 1.05
+
+
 def test_revolutions_of_a_disc() -> None:
     """Means of friction that varies with the angle; the angle from a count, a speed or a period."""
     time = np.arange(0, 12.2, 0.01)
@@ -400,6 +419,26 @@ def test_revolutions_of_a_disc() -> None:
     assert "groups of 4 revolutions" in found.attrs["notes"]
     with pytest.raises(mesoslip.FileError, match="whole revolutions"):
         mesoslip.strokes(record_tree(time[::300], force[::300], revolutions=0.8 * time[::300]))
+
+
+def test_falls_of_the_track_of_a_disc_are_no_slips(tmp_path) -> None:  # type: ignore[no-untyped-def]
+    """Two waves in a revolution, at a speed that is recorded with an error of 1 %; slips between
+    which the disc turns by any angle are slips."""
+    rng = np.random.default_rng(5)
+    time = np.arange(0, 200, 0.02)
+    turn = math.tau * 1.99 * time
+    waves = 2 + 0.1 * np.sin(turn + 1) + 0.3 * np.sin(2 * turn)
+    saw = 2 - 0.3 * ((time / 0.7123) % 1 > 0.9) + 0.5 * ((time / 0.7123) % 1)
+    for force, is_track in ((waves, True), (saw, False)):
+        table = np.transpose([time, force + 0.05 * rng.standard_normal(time.size)])
+        rows = "".join(f"{at:.2f},{one:.4f},{60 * 1.99 * 1.01:.2f}\n" for at, one in table)
+        file = tmp_path / "disc.csv"
+        file.write_text("time [s],force [N],rotation speed [rpm]\n" + rows)
+        tree = mesoslip.read_trace(file)
+        text = "falls keep the phase of the rotation, and are those of the track"
+        assert (text in tree.attrs.get("comment", "")) == is_track
+        assert (tree["slips"].sizes["slip"] == 0) == is_track
+    assert mesoslip.read_trace(file, min_fall=0.3)["slips"].sizes["slip"] > 0
 
 
 def test_a_file_of_a_disc(tmp_path) -> None:  # type: ignore[no-untyped-def]
@@ -456,6 +495,10 @@ def test_the_period_of_revolutions_is_found() -> None:
     force += 0.1 * rng.standard_normal(time.size)
     assert found_period(time, force) == pytest.approx(0.9234, rel=1e-3)
     assert found_period(time, rng.standard_normal(time.size)) is None
+    # Of a few samples, with a strong second harmonic, over many periods.
+    turn = math.tau * 1.99 * np.arange(0, 200, 0.02)
+    wave = 0.1 * np.sin(turn + 1) + 0.3 * np.sin(2 * turn) + 0.05 * rng.standard_normal(turn.size)
+    assert found_period(np.arange(0, 200, 0.02), wave) == pytest.approx(1 / 1.99, rel=1e-4)
     found = strokes_of(record_tree(time, force), period="auto")
     assert found.notes[0].startswith("guess: a revolution takes 923")
     with pytest.raises(mesoslip.FileError, match="does not repeat"):

@@ -58,6 +58,8 @@ EXAMPLE_FACTORS = {
 }
 # Minimum distance from the range of 80 % of the others, over that range.
 SENTINEL_DISTANCE = 1.0
+# Minimum number of values of a time over that of another one beside it.
+MIN_TIMES = 0.2
 # Percentage of steps between samples that are those of an ordinary signal.
 USUAL_STEPS = 99.0
 # Maximum correlation of steps of the force with those of the displacement of a slider.
@@ -337,9 +339,8 @@ def _two(
                 usable.append(index)
             else:
                 found.unused[index] = "has no numbers"
-    if quantity == "time" and len(usable) == 2 and _same_clock(*table.values[usable]):
-        usable.sort(key=lambda one: np.unique(table.values[one]).size)
-        found.unused[usable.pop(0)] = "another column has the same time"
+    if quantity == "time" and usable:
+        usable = _clocks(table, usable, found)
     if len(usable) == 1:
         _use(table, quantity, usable[0], headings[usable[0]], found)
         return
@@ -351,6 +352,20 @@ def _two(
         )
     for index in usable:
         found.unused[index] = f"two columns of {quantity.replace('_', ' ')}"
+
+
+def _clocks(table: Table, indices: Sequence[int], found: Assignment) -> list[int]:
+    """Columns of times without those that are the same as the finest one, or hardly change."""
+    counts = {one: np.unique(table.values[one]).size for one in indices}
+    finest = max(reversed(indices), key=counts.__getitem__)
+    for one in indices:
+        if one == finest:
+            continue
+        if _same_clock(table.values[one], table.values[finest]):
+            found.unused[one] = "another column has the same time"
+        elif counts[one] < MIN_TIMES * counts[finest]:
+            found.unused[one] = "hardly changes: a duration, beside another time"
+    return [one for one in indices if one not in found.unused]
 
 
 def _same_clock(one: Array, other: Array) -> bool:

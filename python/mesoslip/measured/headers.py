@@ -68,7 +68,7 @@ NAMES = {
     "sliding_speed": "sliding speed|sliding velocity|speed|velocity|linear speed|linear velocity"
     "|surface speed|surface velocity|entrainment speed|rolling speed|gleitgeschwindigkeit"
     "|geschwindigkeit|load point velocity|lp velocity|drive velocity|slip rate",
-    EITHER: "displacement|displ|disp|position|pos|x|distance|travel|horizontal displacement"
+    EITHER: "displacement|displ|disp|position|pos|x|distance|travel|stroke|horizontal displacement"
     "|shear displacement|weg|deplacement|horizontal disp|shear disp|x position",
 }  # fmt: skip
 # Quantities of names by the dimension of their unit, which tells forces from stresses.

@@ -95,7 +95,7 @@ def read_record(paths: Sequence[Path], trace: TraceDescription) -> Record:
         raise FileError(f"{path}: {error}; the other columns are {names}") from None
     force = made.values
     if "time" in values:
-        time, moved = continued(values["time"], tables)
+        time, moved = continued(values["time"], tables, columns.used["time"].index)
         notes += moved
     else:
         time = np.arange(len(table.lines)) / (trace.si("rate") or 1.0)

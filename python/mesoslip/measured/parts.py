@@ -39,13 +39,19 @@ def joined(tables: Sequence[Table]) -> Table:
     )
 
 
-def continued(time: Array, tables: Sequence[Table]) -> tuple[Array, list[str]]:
-    """Times of all rows of parts that follow each other by a usual interval, and notes on clocks
-    that start again."""
+def continued(time: Array, tables: Sequence[Table], column: int) -> tuple[Array, list[str]]:
+    """Times of all rows of parts, and notes on parts whose clock starts again.
+
+    Time stamps with dates, of the column of the time, are seconds from the first part. Other times
+    follow the end of the part before by a usual interval.
+    """
     time, notes, start = time.copy() if len(tables) > 1 else time, [], 0
     for before, table in pairwise(tables):
         start += before.values.shape[1]
         earlier, rest = time[:start], time[start:]
+        if column in before.starts and column in table.starts:
+            rest += table.starts[column] - before.starts[column]
+            continue
         known = rest[np.isfinite(rest)]
         if not known.size or not np.isfinite(earlier).any() or known[0] > np.nanmax(earlier):
             continue

@@ -16,6 +16,8 @@ from mesoslip.analysis.apparatus import first_velocity
 from mesoslip.analysis.noise import TraceNoise, estimate_noise
 from mesoslip.analysis.sampled_slips import FoundSlips
 from mesoslip.analysis.strokes import (
+    angle_of,
+    are_of_track,
     back_and_forth,
     find_slips_between_reversals,
     monotone_pieces,
@@ -315,8 +317,15 @@ def trace_of(understood: Understood) -> DataTree:
         min_fall=trace.si("min_fall"),
         loading_rate=loading_rate,
     )
+    comments = []
+    if trace.min_fall is None and _are_of_track(record, found):
+        comments.append(
+            f"guess: {len(found)} falls keep the phase of the rotation, and are those of the "
+            "track, no slips; --min-fall counts all above it"
+        )
+        found = found.without_slips()
     level = noise.deviation if isinstance(noise, TraceNoise) else noise
-    comments = (
+    comments += (
         _comments(direction * record.force, level, found.period)
         if pieces is None
         else [back_and_forth(len(pieces), cut_by)]
@@ -344,6 +353,15 @@ def trace_of(understood: Understood) -> DataTree:
         velocity,
         attributes,
     )
+
+
+def _are_of_track(record: Record, found: FoundSlips) -> bool:
+    """Whether the falls of a record are those of the track of a disc."""
+    known = record.rotation_speed if record.revolutions is None else record.revolutions
+    if known is None or not np.isfinite(known).any():
+        return False
+    angle = angle_of(record.time, record.revolutions, record.rotation_speed)
+    return are_of_track(found, record.time, angle)
 
 
 def _comments(force: Array, noise: float, period: float) -> Iterator[str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
@@ -145,6 +145,21 @@ class FoundSlips:
 
     def __len__(self) -> int:
         return len(self.start_time)
+
+    def without_slips(self) -> FoundSlips:
+        """The same search, with no slip found."""
+        none, no_samples = np.empty(0), np.empty(0, dtype=int)
+        return replace(
+            self,
+            start_time=none,
+            end_time=none,
+            force_before=none,
+            force_after=none,
+            fall_rate=none,
+            first=no_samples,
+            last=no_samples,
+            period=math.inf,
+        )
 
 
 def find_slips(

@@ -3,7 +3,12 @@ measured properties of strokes and cycles."""
 
 from mesoslip.analysis.strokes.catalogue import Strokes, strokes, strokes_from, strokes_of
 from mesoslip.analysis.strokes.friction_map import FrictionMap, along, friction_map, place_of
-from mesoslip.analysis.strokes.revolutions import found_period, has_rotation
+from mesoslip.analysis.strokes.revolutions import (
+    angle_of,
+    are_of_track,
+    found_period,
+    has_rotation,
+)
 from mesoslip.analysis.strokes.segments import (
     Piece,
     back_and_forth,
@@ -21,6 +26,8 @@ __all__ = [
     "Sliding",
     "Strokes",
     "along",
+    "angle_of",
+    "are_of_track",
     "back_and_forth",
     "find_slips_between_reversals",
     "found_period",

@@ -11,6 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from mesoslip.analysis.sampled_slips import FoundSlips
 from mesoslip.analysis.strokes.cycles import Cycle
 from mesoslip.analysis.strokes.measure import Measured, Stroke, mean_of
 from mesoslip.analysis.strokes.record import StrokeRecord, record_in
@@ -25,6 +26,11 @@ MIN_CORRELATION = 0.3
 # Minimum number of samples of a row.
 MIN_SAMPLES = 20
 COUNT, SPEED = "revolutions", "rotation_speed"
+# Falls of the track: minimum number, maximum number that is compared, minimum duration over the
+# time between them, and minimum coherence with the rotation, whose speed may be wrong by a share,
+# or with a multiple of it.
+MIN_FALLS, MAX_FALLS, MIN_SLOW, MIN_COHERENCE = 20, 1000, 0.1, 0.7
+SPEED_ERROR, MAX_MULTIPLE = 0.02, 4
 
 
 def has_rotation(tree: Tree) -> bool:
@@ -96,15 +102,23 @@ def found_period(time: Array, force: Array) -> float | None:
     if not peaks.size or correlation[peaks].max() < MIN_CORRELATION:
         return None
     first = int(peaks[correlation[peaks] > 0.9 * correlation[peaks].max()][0])
-    # The last multiple of it has the smallest relative error.
-    times = lags.size // first - 1
-    last = max(1, times) * first
-    near = slice(max(first, last - first // 4), last + first // 4 + 1)
-    last = near.start + int(np.argmax(correlation[near]))
-    left, middle, right = correlation[last - 1 : last + 2] if last + 1 < lags.size else (0, 1, 0)
+    # Multiples of it have smaller relative errors, by which larger ones are found.
+    lag, times = _peak(correlation, first, first // 4), 1
+    while times < (last := int((lags.size - 1) / lag - 0.5)):
+        times = min(2 * times, last)
+        lag = _peak(correlation, round(times * lag), first // 4) / times
+    return lag * interval
+
+
+def _peak(correlation: Array, near: int, reach: int) -> float:
+    """Lag of the maximum near a lag, of a parabola through three samples."""
+    start = max(1, near - reach)
+    at = start + int(np.argmax(correlation[start : near + reach + 1]))
+    if at + 1 >= correlation.size:
+        return float(at)
+    left, middle, right = correlation[at - 1 : at + 2].tolist()
     bend = left - 2 * middle + right
-    shift = 0.5 * (left - right) / bend if bend < 0 else 0.0
-    return (last + shift) * interval / max(1, times)
+    return at + (0.5 * (left - right) / bend if bend < 0 else 0.0)
 
 
 def _angle(tree: Tree, realization: int, time: Array, period: float | None) -> tuple[Array, str]:
@@ -114,12 +128,46 @@ def _angle(tree: Tree, realization: int, time: Array, period: float | None) -> t
     root = tree.to_dataset()
     name = COUNT if COUNT in root else SPEED
     values = root[name].values[realization][: time.size].astype(float)
+    if name == COUNT:
+        return angle_of(time, values, None), "column of revolutions"
+    return angle_of(time, None, values), "speed of rotation"
+
+
+def angle_of(time: Array, count: Array | None, speed: Array | None) -> Array:
+    """Revolutions at some times, which do not decrease, by a count or else by a speed of rotation;
+    NaN are missing."""
+    values = count if count is not None else speed
+    if values is None:
+        raise ValueError("neither revolutions nor their speed are known")
     known = np.isfinite(values)
     values = np.abs(np.interp(time, time[known], values[known]))
-    if name == COUNT:
-        return np.maximum.accumulate(values), "column of revolutions"
+    if count is not None:
+        found: Array = np.maximum.accumulate(values)
+        return found
     steps = 0.5 * (values[1:] + values[:-1]) * np.diff(time)
-    return np.concatenate([[0.0], np.cumsum(steps)]), "speed of rotation"
+    return np.concatenate([[0.0], np.cumsum(steps)])
+
+
+def are_of_track(slips: FoundSlips, time: Array, angle: Array) -> bool:
+    """Whether falls are those of the track of a disc, which turned by some angles [revolutions].
+
+    They are slow, and keep the phase of the rotation, whose speed is known within some percent, or
+    of a multiple of it.
+    """
+    if len(slips) < MIN_FALLS:
+        return False
+    took, waited = slips.end_time - slips.start_time, np.diff(slips.start_time)
+    if float(np.median(took)) < MIN_SLOW * float(np.median(waited)):
+        return False
+    at = np.interp(slips.start_time, time, angle)[:MAX_FALLS]
+    for multiple in range(1, MAX_MULTIPLE + 1):
+        span = multiple * float(at[-1] - at[0])
+        count = 2 * math.ceil(4 * SPEED_ERROR * span) + 1
+        for factor in np.linspace(1 - SPEED_ERROR, 1 + SPEED_ERROR, count).tolist():
+            phases = np.exp(2j * math.pi * multiple * factor * (at - at[0]))
+            if abs(phases.sum()) > MIN_COHERENCE * at.size:
+                return True
+    return False
 
 
 def _row(record: StrokeRecord, piece: Piece) -> Stroke:

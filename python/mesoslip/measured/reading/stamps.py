@@ -81,8 +81,8 @@ def _days(text: str) -> dict[Order, int]:
 
 
 def chosen_order(dates: Iterable[str]) -> Chosen:
-    """The order of dates that were written one after the other."""
-    days = [_days(one) for one in dates]
+    """The order of dates that were written one after the other; one of them exists at least."""
+    days = [found for one in dates if (found := _days(one))]
     orders = [one for one in ORDERS if all(one in each for each in days)]
     # Dates that exist in no common order are found where they are read.
     orders = orders or [one for one in ORDERS if one in days[0]]
@@ -116,6 +116,11 @@ class Clock:
         self.first = ""
         self._start = self._last = self._days = 0
 
+    @property
+    def start(self) -> float:
+        """The first time stamp [s]."""
+        return self._start / 1e9
+
     def seconds(self, cell: str) -> float | None:
         """Seconds of a cell; None if it is not a time stamp."""
         found = STAMP.fullmatch(cell)
@@ -125,7 +130,7 @@ class Clock:
         if not written and (found["colon"] == "." or found["second"] is None):
             return None
         hour, minute, second = (int(found[one] or 0) for one in ("hour", "minute", "second"))
-        if found["half"] and 1 <= hour <= 12:
+        if found["half"] and hour <= 12:
             hour = hour % 12 + (12 if found["half"] in "Pp" else 0)
         day: int | None = self._days
         if written:

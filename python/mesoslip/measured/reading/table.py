@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
@@ -41,6 +41,8 @@ class Table:
     """Lines about the file."""
     dates: Order | None = None
     """Order of the dates in its time stamps."""
+    starts: Mapping[int, float] = field(default_factory=dict)
+    """First time stamps of columns whose dates are known [s], from one day for all files."""
 
     @property
     def row(self) -> str:

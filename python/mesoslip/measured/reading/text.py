@@ -108,6 +108,7 @@ def read_text(
         True,
         [*_layout_notes(layout), *body.notes()],
         body.order_of_dates,
+        {at: one.start for at, one in body.clocks.items() if one.chosen and not one.chosen.is_open},
     )
 
 

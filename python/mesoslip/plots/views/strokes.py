@@ -14,6 +14,8 @@ from mesoslip.analysis.strokes import (
     place_of,
     strokes_of,
 )
+from mesoslip.analysis.strokes.measure import MIDDLE
+from mesoslip.array_types import Array
 from mesoslip.output.arrays import Tree
 from mesoslip.plots.printing import is_narrow
 from mesoslip.plots.style import (
@@ -32,7 +34,7 @@ from mesoslip.quantities import Scale, scale_for
 
 # Maximum number of loops in a picture; those between are left out.
 MAX_LOOPS = 12
-# Quantiles of the friction that limit the colours of maps.
+# Quantiles of the friction in the middle of strokes that limit the colours of maps.
 RANGE = (0.02, 0.98)
 DIRECTIONS = {1: "forwards", -1: "backwards"}
 
@@ -69,8 +71,10 @@ def draw_loops(axes: Axes, found: Strokes) -> None:
             (1 - share) * one + share * two
             for one, two in zip((0, 0.27, 0.53), (0.73, 0.33, 0.4), strict=True)
         )
-        x = np.concatenate([place_of(record, one) for one in pairs[index]])
-        y = np.concatenate([one.direction * along(record, one) for one in pairs[index]])
+        # Without a position, each begins anew at the left.
+        gap = [] if record.position is not None else [np.nan]
+        x = np.concatenate([[*place_of(record, one), *gap] for one in pairs[index]])
+        y = np.concatenate([[*one.direction * along(record, one), *gap] for one in pairs[index]])
         axes.plot(x / place.size, y / scale.size, color=colour, linestyle="-", linewidth=0.7)
     axes.set(xlabel=label, ylabel=scale.label(f"{name}, signed"))
 
@@ -122,6 +126,13 @@ def _draw_map(axes: Axes, found: Strokes, one: FrictionMap, limits: tuple[float,
     axes.figure.colorbar(drawn, ax=axes, label=scale.label(name))
 
 
+def _sliding(one: FrictionMap) -> Array:
+    """The friction in the middle of the strokes, without the reversals."""
+    edge = round(0.5 * (1 - MIDDLE) * one.friction.shape[0])
+    middle = one.friction[edge : one.friction.shape[0] - edge]
+    return middle[np.isfinite(middle)]
+
+
 def draw(tree: Tree, options: Options, figure: Canvas | None) -> Canvas:
     """Loops, friction over strokes, and a friction map for each direction."""
     found = _found(tree, options)
@@ -143,7 +154,7 @@ def draw(tree: Tree, options: Options, figure: Canvas | None) -> Canvas:
     draw_loops(panels[0], found)
     titles(panels[0], tree)
     draw_cycles(panels[1], found)
-    values = np.concatenate([one.friction[np.isfinite(one.friction)] for one in maps.values()])
+    values = np.concatenate([_sliding(one) for one in maps.values()])
     low, high = (float(one) for one in np.quantile(values, RANGE))
     for axes, (direction, one) in zip(panels[2:], maps.items(), strict=True):
         _draw_map(axes, found, one, (low, high))

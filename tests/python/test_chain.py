@@ -173,7 +173,7 @@ def test_a_sweep_up_and_down(tmp_path):
     drive = {"stage": [{"duration": 0.4, "velocity": one} for one in stages]}
     whole = Config.from_dict(SHORT | {"drive": drive, "run": SHORT["run"] | {"duration": 2.4}})
     plan = Plan.from_dict(sweep_tables(order="up and down", discard=0.0))
-    interval = plan.combinations[0].config.output_interval
+    interval = plan.config(0).output_interval
     trace = finished(whole.replace({"output.interval": interval}))[0].records("trace")
     with Store(tmp_path, "points") as store:
         done = run_sweep(plan, store=store)
@@ -206,11 +206,12 @@ def test_a_sweep_up_and_down(tmp_path):
 def test_other_axes_are_other_chains():
     grid = {"drive.velocity": VELOCITIES[::-1], "contacts.delay": [1e-4, 5e-4]}
     for order, expected in (("up", VELOCITIES), ("listed", VELOCITIES[::-1])):
-        chains = Plan.from_dict(sweep_tables(grid=grid, order=order)).chains
+        plan = Plan.from_dict(sweep_tables(grid=grid, order=order))
+        chains = [[plan.values(one) for one in chain] for chain in plan.chains()]
         assert len(chains) == 2
         for chain, delay in zip(chains, grid["contacts.delay"], strict=True):
-            assert [one.values["drive.velocity"] for one in chain] == expected
-            assert {one.values["contacts.delay"] for one in chain} == {delay}
+            assert [one["drive.velocity"] for one in chain] == expected
+            assert {one["contacts.delay"] for one in chain} == {delay}
 
 
 def test_a_failure_ends_its_chain_only():
@@ -264,4 +265,4 @@ def test_what_cannot_go_on_is_refused(changes, message):
         (given if key == "run" else given["sweep"])[key] = value
     given["sweep"] = {key: one for key, one in given["sweep"].items() if one is not None}
     with pytest.raises(ConfigError, match=message):
-        _ = Plan.from_dict(given).combinations
+        _ = Plan.from_dict(given).keys

@@ -222,7 +222,7 @@ def check_toml(block, folder, parts):
     path.write_text(text if named or "base" in tables else base + text)
     make_shorter(path)
     if "sweep" in tables:
-        assert Plan.load(path).combinations
+        assert Plan.load(path).keys
     elif "fit" in tables:
         assert FitPlan.load(path)
     else:

@@ -420,7 +420,7 @@ def test_whole_numbers_of_a_range_are_exact():
     first = 9_007_199_254_740_993
     grid = {"run.seed": {"from": first, "to": first + 4, "points": 5}}
     plan = Plan.from_dict({**TINY, "sweep": {"measures": ["breaks"], "grid": grid}})
-    seeds = [one.config.run.seed for one in plan.combinations]
+    seeds = [plan.config(number).run.seed for number in range(5)]
     assert seeds == [first + number for number in range(5)]
     data = mesoslip.sweep(plan, executor=1)
     assert data["run.seed"].values.tolist() == seeds

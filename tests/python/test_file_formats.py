@@ -7,8 +7,11 @@ import datetime
 import nptdms
 import numpy as np
 import openpyxl
+import pandas
 import pytest
-from mesoslip import FileError
+from mesoslip import ConfigError, FileError
+from mesoslip.measured.reading import blocks
+from mesoslip.measured.reading.stamps import Chosen, chosen_order
 from mesoslip.measured.trace import understand
 
 COUNT = 300
@@ -76,6 +79,14 @@ def test_dates_of_a_workbook_are_times(tmp_path):
         ("%Y-%m-%d %H:%M:%S,{}+02:00", ";", ","),
         ("%d.%m.%Y %H:%M:%S.{}", "\t", "."),
         ("%H:%M:%S.{}", "\t", "."),
+        ("%Y/%m/%d %H:%M:%S.{}", ",", "."),
+        ("%d.%m.%Y %H:%M:%S,{}", ";", ","),
+        ("%d.%m.%y %H.%M.%S,{}", ";", ","),
+        ("%d-%b-%y %H:%M:%S.{}", ",", "."),
+        ("%d. %B %Y %H:%M:%S.{}", "\t", "."),
+        ("%b %d %Y %H:%M:%S:{}", "\t", "."),
+        ("%m/%d/%Y, %I:%M:%S.{} %p", ";", "."),
+        ("%d/%m/%Y %H:%M:%S.{} UTC", "\t", "."),
     ],
 )
 def test_time_stamps_are_seconds_from_the_first(form, delimiter, sign, tmp_path):
@@ -89,6 +100,79 @@ def test_time_stamps_are_seconds_from_the_first(form, delimiter, sign, tmp_path)
     check(path)
     assert "time stamps, as seconds from" in report_of(path)
     assert "no unit" not in report_of(path)
+
+
+def dated(path, form, step, count=12, start=START):
+    """A file with a row after each step of time, and its times."""
+    stamps = [start + n * step for n in range(count)]
+    rows = [f"{one.strftime(form)},{n % 4}.5" for n, one in enumerate(stamps)]
+    path.write_text("Timestamp,Force [N]\n" + "\n".join(rows) + "\n", encoding="utf-8")
+    dates = pandas.to_datetime([row.split(",")[0] for row in rows], format=form)
+    return (dates - dates[0]).total_seconds().to_numpy()
+
+
+SHORT, LONG = datetime.timedelta(minutes=1), datetime.timedelta(days=2)
+
+
+@pytest.mark.parametrize("form", ["%d/%m/%Y %H:%M", "%m/%d/%Y %H:%M", "%m/%d/%y %H:%M:%S"])
+def test_the_order_of_a_date_is_that_of_the_only_possible_one(form, tmp_path):
+    """A day above 12, or the only order in which times increase."""
+    times = dated(tmp_path / "a.csv", form, LONG)
+    np.testing.assert_array_equal(understand(tmp_path / "a.csv").record.time, times)
+    # From April to May; in the other order from November back to August.
+    assert chosen_order(["11/04/2026", "08/05/2026"]) == Chosen("dmy")
+    assert chosen_order(["04/11/2026", "05/08/2026"]) == Chosen("mdy")
+
+
+@pytest.mark.parametrize("form", ["%d/%m/%Y %H:%M", "%m/%d/%Y %H:%M", "%y-%m-%d %H:%M"])
+def test_a_guessed_order_of_dates_is_printed_and_overruled(form, tmp_path):
+    """Dates before the 13th, past midnight: the guess is the shortest record."""
+    path, start = tmp_path / "a.csv", datetime.datetime(2026, 3, 4, 23, 55)
+    times = dated(path, form, SHORT, start=start)
+    record = understand(path).record
+    np.testing.assert_array_equal(record.time, times)
+    order = form.replace("%", "")[:5].lower().replace("/", "").replace("-", "")
+    words = "/".join({"d": "day", "m": "month", "y": "year"}[one] for one in order)
+    assert f"dates as {words} (--dates)" in "\n".join(record.report)
+    assert "guess: column 1" in "\n".join(record.report)
+    assert "guess: column 1" not in report_of(path, dates=order)
+    other = {"dmy": "mdy", "mdy": "dmy", "ymd": "dmy"}[order]
+    np.testing.assert_array_less(
+        times[-1] + 20 * 86400, understand(path, dates=other).record.time[-1]
+    )
+    # A column of one day has the same times in any order.
+    dated(path, form, SHORT, start=start.replace(hour=12))
+    assert "guess: column 1" not in report_of(path)
+
+
+def test_a_date_that_the_order_does_not_have_is_named(tmp_path):
+    path = tmp_path / "a.csv"
+    dated(path, "%m/%d/%Y %H:%M", LONG, start=datetime.datetime(2026, 3, 11, 12))
+    with pytest.raises(FileError, match=r"line 3: .*'03/13/2026 12:00', is not a number, nor a da"):
+        understand(path, dates="dmy")
+    with pytest.raises(ConfigError, match="--dates = 'day': must be 'dmy', 'mdy' or 'ymd'"):
+        understand(path, dates="day")
+
+
+def test_the_line_of_units_has_the_order_of_dates(tmp_path):
+    path = tmp_path / "a.csv"
+    dated(path, "%m/%d/%Y %H:%M", SHORT, start=datetime.datetime(2026, 3, 4, 23, 55))
+    _, *rows = path.read_text().splitlines()
+    for form, size in (("dd/mm/yyyy hh:mm", 29 * 86400 + 660), ("mm/dd/yyyy hh:mm", 660)):
+        path.write_text("\n".join(["Time,Force", f"{form},N", *rows]) + "\n")
+        record = understand(path).record
+        assert record.time[-1] == size
+        assert "guess: column 1" not in "\n".join(record.report)
+
+
+def test_blocks_of_a_file_have_one_order_of_dates(tmp_path, monkeypatch):
+    """Found in the first block; a block below, with other dates only, is read alike."""
+    monkeypatch.setattr(blocks, "BLOCK", 400)
+    path, start = tmp_path / "a.csv", datetime.datetime(2026, 3, 4, 23, 55)
+    times = dated(path, "%m/%d/%Y %H:%M:%S", datetime.timedelta(seconds=5), 300, start)
+    record = understand(path, rate=0.2).record
+    np.testing.assert_array_equal(record.time, times)
+    assert "\n".join(record.report).count("dates as month/day/year (--dates)") == 1
 
 
 def test_a_time_stamp_among_numbers_is_none(tmp_path):

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 import tomli_w
 from conftest import klein_tables, long
-from mesoslip.errors import ConfigError, FileError
+from mesoslip.errors import ConfigError, FileError, WriteError
 from mesoslip.execution.stop import Stop, StoppedError
 from mesoslip.execution.store import Store
 from mesoslip.inference import checks, fit_trace, likelihood, rounds, sampler
@@ -409,6 +409,19 @@ def test_the_same_seed_gives_the_same_posterior(small_fit, tmp_path, command, mo
     assert status == 0
     row = json.loads(printed)["parameters"]["contacts.delay"]
     assert row["interval_90"][0] < row["median"] < row["interval_90"][1]
+    # Without room for it, the simulations are kept.
+    with Store(store, "simulations") as kept:
+        kept.write("000000", {})
+
+    def full(*_):
+        raise WriteError("no space left on the disk")
+
+    monkeypatch.setattr("mesoslip.output.writing.write", full)
+    with few_simulations():
+        status, _, err = command(*line)
+    assert status == 1
+    assert "no space left on the disk; 1 simulation is stored: the same command continues" in err
+    assert (store / "000000.json").exists()
 
 
 @pytest.mark.parametrize("damage", ["brackets", "digits", "number", "none", "cut"])

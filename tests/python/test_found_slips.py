@@ -11,7 +11,7 @@ from conftest import klein_tables, long
 from made_records import judge, made_record
 from mesoslip.analysis.alternating_extremes import extremes_of
 from mesoslip.analysis.rate_and_state import Loading
-from mesoslip.analysis.regime import SMOOTH, STICK_SLIP
+from mesoslip.analysis.regime import SMOOTH, STICK_SLIP, TRANSIENT
 from mesoslip.analysis.sampled_slips import find_slips, windows
 from mesoslip.analysis.sampled_slips.windows import Windows, lines_through, parabolas_through
 from mesoslip.analysis.stick_phases import stick_phases
@@ -347,6 +347,20 @@ def test_small_slips_are_stick_slip_and_smooth_sliding_has_none(tmp_path):
         counts = tree["slip_counts"]
         assert counts["mirrored_count"].sizes == counts["slip_count"].sizes
     assert found == {"slips": (STICK_SLIP, 16), "smooth": (SMOOTH, 0)}
+
+
+@pytest.mark.parametrize("slips", [2, 7])
+def test_small_slips_too_few_for_a_regime_are_not_smooth(slips, tmp_path):
+    """As the evaluated half of the record has fewer than four."""
+    time = np.arange(0.0, 10.0 * (slips + 1), 0.02)
+    noise = np.random.default_rng(1).normal(0, 1e-8, time.size)
+    force = 6e-4 + 5.3e-6 * (time / 10 % 1) + noise
+    path = tmp_path / "few.csv"
+    columns = np.column_stack([time, force])
+    np.savetxt(path, columns, header="time [s],force [N]", comments="", delimiter=",")
+    tree = mesoslip.read_trace(path, velocity=1e-6)
+    assert tree["slips"].sizes["slip"] == slips
+    assert mesoslip.regime(tree)["regime"].item() == TRANSIENT
 
 
 @pytest.mark.parametrize("noise", [0.001, 0.05, 0.08])

@@ -73,8 +73,19 @@ MTS = (
     "Time\tShear Displacement\tShear Force\tNormal Force\nSec\tmm\tkN\tkN\n"
     + rows(TIME, X, 1e-3 * FORCE, 1e-3 * LOAD + 0 * X, form="{:.7f}")
 )
+DATED = "Date\tTime\tElapsed Time (s)\tCharge normale (N)\tFriction (N)\n" + "".join(
+    f"04/03/2026\t16:10:{int(t):02d}\t{t:.1f}\t{LOAD}\t{f:.4f}\n"
+    for t, f in zip(TIME, FORCE, strict=True)
+)
 TEXTS = {
     "LabVIEW (.lvm)": (LABVIEW, {}),
+    "LabVIEW without comments, with units": (
+        LABVIEW.replace("\t\n", "\n")
+        .replace("X_Dimension", "Y_Unit_Label\tN\t\nX_Dimension")
+        .replace("Force (N)", "Force"),
+        {},
+    ),
+    "clock of whole seconds beside the elapsed time": (DATED, {}),
     "oscilloscope of Tektronix": (TEKTRONIX, {"columns": "time [s], force [N]"}),
     "PicoScope": (PICOSCOPE, {"columns": "time [ms], force [mN]"}),
     "oscilloscope of Keysight": (KEYSIGHT, {"columns": "time [s], force [N]"}),

@@ -477,6 +477,57 @@ def test_a_few_slips_at_the_end_of_a_stroke_are_sliding(number, tmp_path):
     assert found.columns["strokes"]["slides"].all()
 
 
+def test_a_force_of_one_sign_may_be_partial_slip_in_strokes() -> None:
+    """With an offset, also in noise of a tenth; the force of slips in one direction is not."""
+    for number in (1031, 1441, 1129, 1316):
+        record = made(number)
+        pieces = pieces_of_force(record.time, record.force)
+        assert pieces is not None
+        found = record.time[[one.first for one in pieces[1:]]]
+        period = 2 * float(np.median(np.diff(record.turns)))
+        for turn in record.turns[1:-1]:
+            assert np.abs(found - turn).min() < 0.12 * period
+    phase = phases()
+    for force in (stick_slip(phase), stick_slip(phase, drop=1.9)):
+        assert pieces_of_force(phase, force - force.min()) is None
+
+
+def test_slips_through_zero_in_one_direction_are_no_strokes() -> None:
+    """Behind a slow filter the force of irregular slips rises nearly as fast as it falls."""
+    rng = np.random.default_rng(5)
+    times = np.cumsum(rng.uniform(0.5, 1.5, 30))
+    time = np.arange(0, times[-1], 0.02)
+    force = (time - times[np.searchsorted(times, time)]) / 0.75 + 0.6
+    force = np.convolve(force, np.full(17, 1 / 17), "same")
+    assert np.quantile(force, 0.1) < -0.6
+    assert np.quantile(force, 0.9) > 0.25
+    assert pieces_of_force(time, force) is None
+
+
+@pytest.mark.parametrize("number", [1151, 1335])
+def test_friction_of_partial_slip_without_a_load_point_has_a_lower_limit(number, tmp_path):
+    """A rest at its end, and the extremes of a sine in noise, are not taken for sliding."""
+    found, record = strokes_of_made(number, tmp_path)
+    assert "mean_friction" not in found.overall
+    limit = found.min_friction
+    assert limit is not None
+    # Loops are closed after the first strokes.
+    closed = record.force[record.time > record.turns[2]]
+    swing = 0.5 * float(np.diff(np.quantile(closed, [0.01, 0.99]))[0])
+    assert 0.75 * swing < limit.value < 1.01 * swing
+    assert limit.error < 0.02 * swing
+    assert "of sliding is at least" in "\n".join(found.notes)
+    assert found.to_json()["min_friction"]["mean"] == limit.value
+
+
+def test_the_sign_of_a_force_in_partial_slip_is_by_the_energy(tmp_path):
+    """Nearly elastic strokes, whose mean force along the motion is hardly positive."""
+    found, record = strokes_of_made(1018, tmp_path)
+    assert found.records[0].sign == 1
+    energy = found.overall["loop_energy"]
+    assert abs(energy.mean - record.loop_energy) < 3 * energy.error
+
+
 def test_rest_at_the_end_of_partial_slip_is_no_sliding(tmp_path):
     """A bend of the force, where the drive comes to rest, is no slip."""
     found, _ = strokes_of_made(47, tmp_path)

@@ -31,8 +31,9 @@ from tally import Tally, arguments
 from test_fit import experiment, fit_tables
 from test_resume import read_whole
 
-# Time that a fit has [s].
+# Time that a fit has [s], and maximum number of times that one is killed before it may end.
 MAX_SECONDS = 600.0
+MAX_KILLS = 3
 
 
 def stored(folder: Path) -> dict[str, tuple[int, int]]:
@@ -58,7 +59,7 @@ def prepared(folder: Path) -> list[object]:
 
 
 def attack(kills: int, folder: Path, random: np.random.Generator) -> Tally:
-    """Kill a fit so many times at least, again and again from the beginning.
+    """Kill a fit so many times at least, again and again from the beginning; each comes to its end.
 
     Parameters
     ----------
@@ -79,26 +80,28 @@ def attack(kills: int, folder: Path, random: np.random.Generator) -> Tally:
     whole = read_whole(expected)
     kept = {path.name for path in folder.iterdir()} | {"posterior.nc"}
     while tally.kills["fits"] < kills:
-        status, there = -1, {}
-        while status != 0 or not output.exists():
+        remaining, there = int(random.integers(1, MAX_KILLS + 1)), {}
+        while True:
             process = Command([*line, "-o", output], folder)
-            end = process.work(float(random.uniform(0.02, 0.5)) * length)
-            if end is None:
-                process.kill()
-                tally.kills["fits"] += 1
-                now = stored(folder)
-                if not output.exists():
-                    gone = [name for name, state in there.items() if now.get(name) != state]
-                    for name in gone:
-                        tally.lose(f"simulation {name} was lost or written again")
-                there = now
-                # So that a fit comes to its end, however long the part that is not stored takes.
-                length *= 1.01
-                continue
-            status = end.status
-            if status != 0:
-                tally.lose(f"exit status {status}: {end.err}")
+            seconds = float(random.uniform(0.02, 0.9)) * length
+            end = process.work(seconds) if remaining else process.wait(MAX_SECONDS)
+            if end is not None:
+                break
+            process.kill()
+            if not remaining:
+                tally.lose("a fit does not end")
                 return tally
+            remaining -= 1
+            tally.kills["fits"] += 1
+            now = stored(folder)
+            if not output.exists():
+                gone = [name for name, state in there.items() if now.get(name) != state]
+                for name in gone:
+                    tally.lose(f"simulation {name} was lost or written again")
+            there = now
+        if end.status != 0:
+            tally.lose(f"exit status {end.status}: {end.err}")
+            return tally
         tally.compare("fit", differences(whole, read_whole(output)))
         left = {path.name for path in folder.iterdir()} - kept
         if left:

@@ -49,6 +49,8 @@ class Made:
     loop_energy: float
     offset: float
     stiffness: float
+    strength: float
+    """Friction of sliding, which partial slip does not reach."""
 
     def write(self, file: Path) -> None:
         """The record as a laboratory would write it."""
@@ -148,6 +150,7 @@ def made(number: int) -> Made:
         energy = float(np.sum((4 * strengths * (half - reaches))[slides]))
         stiffness = float(springs.sum())
     signs = np.sign(np.cos(2 * np.pi * path))
+    strength = friction
     friction, bias = truth(path, x, force, ends, signs, interface, friction, has_load_point)
     if not math.isfinite(energy):
         energy = measured_energy(path, x, force, ends)
@@ -181,6 +184,7 @@ def made(number: int) -> Made:
         energy if has_load_point else math.nan,
         offset + sensor * bias,
         stiffness if has_load_point else math.nan,
+        strength,
     )
 
 
@@ -245,6 +249,8 @@ class Verdict:
     false_slips: int
     found_slips: int
     true_slips: int
+    limit: float
+    """Stated lower limit of the friction of sliding over that friction; NaN if it is not stated."""
     deviations: dict[str, float]
     """Deviation over the stated error by quantity; NaN if it is not stated."""
     relative: dict[str, float]
@@ -276,7 +282,7 @@ def judged(record: Made) -> Verdict:
     try:
         found = strokes_of(tree)
     except FileError:
-        return Verdict(False, reversals, false, sum(real), record.slips.size, {}, {})
+        return Verdict(False, reversals, false, sum(real), record.slips.size, math.nan, {}, {})
     begun = np.array([one.start_time for one in found.strokes[0]])
     period = 2 * float(np.median(np.diff(record.turns)))
     expected = record.turns[:-1]
@@ -300,7 +306,9 @@ def judged(record: Made) -> Verdict:
         deviations[name] = (one.mean - value) / max(one.error, 1e-12 * abs(value))
         scale = record.friction if name == "offset" else abs(value)
         relative[name] = (one.mean - value) / scale
-    return Verdict(right, reversals, false, sum(real), record.slips.size, deviations, relative)
+    limit = math.nan if found.min_friction is None else found.min_friction.value / record.strength
+    counts = (right, reversals, false, sum(real), record.slips.size)
+    return Verdict(*counts, limit, deviations, relative)
 
 
 def main() -> None:
@@ -340,13 +348,16 @@ def report(verdicts: Sequence[Verdict]) -> None:
         sum(getattr(one, key) for one in verdicts) for key in ("found_slips", "true_slips")
     )
     print(f"slips found: {found} of {there}")
+    limits = np.array([one.limit for one in verdicts if math.isfinite(one.limit)])
+    print(f"lower limits of friction: {limits.size}, above it {int((limits > 1.01).sum())}")
     for quantity in QUANTITIES:
         stated = [one.deviations[quantity] for one in verdicts if quantity in one.deviations]
         known = np.array([one for one in stated if math.isfinite(one)])
         inside = int((np.abs(known) <= 1.96).sum())
+        share = inside / max(known.size, 1)
         sizes = [abs(one.relative[quantity]) for one in verdicts if quantity in one.relative]
         print(
-            f"{quantity}: within 95 % errors {inside} of {known.size} = {inside / known.size:.3f}, "
+            f"{quantity}: within 95 % errors {inside} of {known.size} = {share:.3f}, "
             f"not stated {len(stated) - known.size}; deviation {100 * np.median(sizes):.2g} % "
             f"(median), {100 * np.quantile(sizes, 0.9):.2g} % (90 % quantile)"
         )

@@ -1,11 +1,10 @@
-"""The axes of a sweep, and a combination of values along them."""
+"""The axes of a sweep, and the values of a combination in words."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from mesoslip.configuration.config import Config
 from mesoslip.configuration.keys import key_kind
 
 Value = float | int | str | bool
@@ -18,15 +17,6 @@ class Axis:
     dimension: str
     keys: tuple[str, ...]
     rows: tuple[tuple[Value, ...], ...]
-
-
-@dataclass(frozen=True)
-class Combination:
-    """A configuration, with its index along each axis and the swept values, in SI, by key."""
-
-    index: tuple[int, ...]
-    values: Mapping[str, Value]
-    config: Config
 
 
 def described(values: Mapping[str, Value]) -> str:

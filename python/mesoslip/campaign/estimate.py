@@ -7,11 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mesoslip.campaign.combination import Combination
 from mesoslip.campaign.sweep import groups, stored_measures
 from mesoslip.campaign.sweep_plan import Plan
+from mesoslip.configuration.config import Config
 from mesoslip.execution.store import Pieces
-from mesoslip.simulation.memory import output_bytes
 from mesoslip.simulation.realization import Realization
 
 # Maximum number of combinations that are tried, and time for all of them [s].
@@ -39,7 +38,7 @@ class Estimate:
 def estimate(plan: Plan, store: Pieces, workers: int) -> Estimate:
     """Estimate time, memory and disk of a sweep from the first moments of some combinations."""
     there = store.names()
-    missing: list[Combination] = []
+    missing: list[int] = []
     stored_count = missing_count = max_chain = 0
     for group in groups(plan):
         copies = len(group.chains)
@@ -54,37 +53,28 @@ def estimate(plan: Plan, store: Pieces, workers: int) -> Estimate:
                 continue
             missing_count += len(chain)
             max_chain = max(max_chain, len(chain))
-            if not missing or missing[-1] is not chain[-1]:
+            if not missing or missing[-1] != chain[-1]:
                 missing += chain
     step = max(1, len(missing) // MAX_TRIED)
     tried = missing[step // 2 :: step]
-    seconds = [_seconds(one, TRIAL_SECONDS / len(tried)) for one in tried]
+    seconds = [_seconds(plan.config(one), TRIAL_SECONDS / len(tried)) for one in tried]
     mean = float(np.mean(seconds)) + OVERHEAD_SECONDS if seconds else 0.0
     longest = max(seconds, default=0.0)
     # The runs of a chain follow one another.
     alone = max(longest, mean * max_chain)
     wall = max(mean * missing_count / workers, alone) + START_SECONDS if missing else 0.0
-    sizes = [_bytes(one, plan) for one in plan.combinations]
-    trace_bytes = max(sizes, default=0.0)
     # Three copies: in the tables of the kernel, in the tree, and in measures.
-    memory = (workers + 1) * PROCESS_BYTES + 3 * workers * trace_bytes
+    memory = (workers + 1) * PROCESS_BYTES + 3 * workers * float(np.max(plan.record_bytes))
     disk: float = plan.count * (POINT_BYTES + 8 * (1 + len(plan.measures)))
     if plan.sweep.traces:
-        disk += sum(sizes) * plan.realizations
+        disk += float(np.sum(plan.record_bytes)) * plan.realizations
     return Estimate(plan.count, stored_count, wall, memory, disk)
 
 
-def _bytes(combination: Combination, plan: Plan) -> float:
-    """Size of the record of a run; by default only kept outputs have finer traces of slips."""
-    config = combination.config
-    has_finer = plan.sweep.traces or config.output.slip_interval is not None
-    return output_bytes(config, has_finer=has_finer)
-
-
-def _seconds(combination: Combination, max_seconds: float) -> float:
-    """Time that a combination takes [s], extrapolated from its start."""
+def _seconds(config: Config, max_seconds: float) -> float:
+    """Time that a run takes [s], extrapolated from its start."""
     start = time.perf_counter()
-    with Realization(combination.config, 0) as realization:
+    with Realization(config, 0) as realization:
         while not realization.finished and time.perf_counter() - start < max_seconds:
             realization.advance(work=2e4)
     return (time.perf_counter() - start) / max(realization.part_done, 1e-6)

@@ -26,7 +26,7 @@ from mesoslip.simulation.realization import Realization
 from mesoslip.simulation.run_realizations import NO_MEMORY, Results
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
 
     from mesoslip.campaign.measures import Measure
     from mesoslip.simulation.start import End
@@ -65,14 +65,11 @@ class Outcome:
     failure: str = ""
 
 
-def chain_keys(
-    configs: Sequence[Config], measures: Sequence[Measure], discard: float
-) -> tuple[str, ...]:
+def chain_keys(combination_keys: Iterable[str]) -> tuple[str, ...]:
     """Hashes of everything that determines the measures of each combination of a chain, except the
     realization: the combination and those before it."""
     keys: list[str] = []
-    for config in configs:
-        key = combination_key(config, measures, discard)
+    for key in combination_keys:
         if keys:
             key = hashlib.sha256(f"{keys[-1]} then {key}".encode()).hexdigest()
         keys.append(key)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from mesoslip.array_types import Dataset
-from mesoslip.campaign.combination import Combination, described
+from mesoslip.campaign.combination import Value, described
 from mesoslip.campaign.point import FORMAT, Outcome, Task, chain_keys, compute, point_name
 from mesoslip.campaign.sweep_dataset import SweepDataset
 from mesoslip.campaign.sweep_plan import Plan, as_plan
@@ -51,13 +51,16 @@ class Sweep:
         return self.missing == 0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Group:
-    """Chains of combinations with the same points, each with a hash of everything that determines
-    its measures as its key."""
+    """Chains of combinations with the same points, such as those that differ only in their titles.
+
+    Combinations are numbers in the plan. Each one of a chain has a key, a hash of everything that
+    determines its measures.
+    """
 
     keys: tuple[str, ...]
-    chains: list[tuple[Combination, ...]]
+    chains: list[tuple[int, ...]]
 
     def names(self, realization: int) -> tuple[str, ...]:
         """Names of the points of a realization, in the order of the runs."""
@@ -67,8 +70,8 @@ class Group:
 def groups(plan: Plan) -> list[Group]:
     """All chains of a sweep, in the order of the first of each group."""
     found: dict[tuple[str, ...], Group] = {}
-    for chain in plan.chains:
-        keys = chain_keys([one.config for one in chain], plan.measures, plan.sweep.discard)
+    for chain in plan.chains():
+        keys = chain_keys(plan.keys[one] for one in chain)
         found.setdefault(keys, Group(keys, [])).chains.append(chain)
     return list(found.values())
 
@@ -84,12 +87,12 @@ def stored_measures(store: Pieces, plan: Plan, name: str) -> dict[str, float] | 
         return None
 
 
-def stored_body(realization: int, outcome: Outcome, combination: Combination) -> dict[str, Any]:
+def stored_body(realization: int, outcome: Outcome, values: Mapping[str, Value]) -> dict[str, Any]:
     """Content of a point in the store."""
     return {
         "format": FORMAT,
         "program": program(),
-        "point": dict(combination.values),
+        "point": dict(values),
         "realization": realization,
         # Python reads its own representation of numbers exactly.
         "measures": {name: repr(value) for name, value in outcome.measures.items()},
@@ -101,7 +104,7 @@ def task_of(plan: Plan, group: Group, realization: int) -> Task:
     """The points of a chain for a worker."""
     return Task(
         group.names(realization),
-        tuple(one.config.to_dict() for one in group.chains[0]),
+        tuple(plan.config(one).to_dict() for one in group.chains[0]),
         realization,
         tuple((one.name, one.source, one.path) for one in plan.measures),
         plan.sweep.discard,
@@ -210,17 +213,16 @@ class _Run:
 
     def _take(self, task: Task, group: Group, at: int, outcome: Outcome) -> None:
         """Keep a point of a chain."""
-        first = group.chains[0][at]
+        values = self._plan.values(group.chains[0][at])
         if outcome.failure:
-            self._failures[described({**first.values, "realization": task.realization})] = (
-                outcome.failure
-            )
+            point = described({**values, "realization": task.realization})
+            self._failures[point] = outcome.failure
             self._failed += len(group.chains)
             for chain in group.chains:
                 self._dataset.fail(chain[at], task.realization)
             return
         if self._store is not None:
-            body = stored_body(task.realization, outcome, first)
+            body = stored_body(task.realization, outcome, values)
             self._store.write(task.names[at], body, outcome.trace)
         self._computed += self._put(group, at, task.realization, outcome.measures)
 

@@ -14,7 +14,6 @@ from mesoslip.execution.program import program
 from mesoslip.output.provenance import program_attributes
 
 if TYPE_CHECKING:
-    from mesoslip.campaign.combination import Combination
     from mesoslip.campaign.sweep_plan import Plan
 
 STATUS = ("ok", "failed", "missing")
@@ -32,18 +31,16 @@ class SweepDataset:
         self._status: NDArray[np.int8] = np.full(shape, MISSING, dtype=np.int8)
         self._values = {one.name: np.full(shape, np.nan) for one in plan.measures}
 
-    def put(
-        self, combination: Combination, realization: int, measures: Mapping[str, float]
-    ) -> None:
+    def put(self, combination: int, realization: int, measures: Mapping[str, float]) -> None:
         """Store the measures of a point."""
-        where = (*combination.index, realization)
+        where = (*self._plan.index(combination), realization)
         self._status[where] = OK
         for name, values in self._values.items():
             values[where] = measures[name]
 
-    def fail(self, combination: Combination, realization: int) -> None:
+    def fail(self, combination: int, realization: int) -> None:
         """Mark a point that failed."""
-        self._status[(*combination.index, realization)] = FAILED
+        self._status[(*self._plan.index(combination), realization)] = FAILED
 
     def dataset(self, ending: str, failures: Mapping[str, str]) -> Dataset:
         """The dataset as it is now: ``status`` and the measures, NaN where points are missing.
@@ -86,7 +83,7 @@ class SweepDataset:
 
         plan = self._plan
         reported = [f"{point}: {reason}" for point, reason in list(failures.items())[:MAX_FAILURES]]
-        return program_attributes(plan.combinations[0].config, "sweep") | {
+        return program_attributes(plan.config(0), "sweep") | {
             "configuration": tomli_w.dumps(plan.tables),
             **({"continued_key": plan.sweep.continue_} if plan.sweep.continue_ else {}),
             "sweep": tomli_w.dumps(plan.sweep.model_dump(exclude_none=True, by_alias=True)),

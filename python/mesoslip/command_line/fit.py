@@ -17,6 +17,7 @@ from mesoslip.command_line.options import (
     output_option,
     print_json,
     print_table,
+    stored_on_full_disk,
     workers_option,
 )
 
@@ -103,9 +104,10 @@ def _fitted(
     store = path.with_name(f"{path.stem}.simulations")
     trees = [files.read_run(one) for one in traces]
     plan = as_plan(config, trees, changes)
-    with interruptible(path, quiet, f"; the same command continues from {store}") as work:
-        tree = fit_traces(traces, plan, store=store, executor=workers, **work._asdict())
-    writing.write(tree, path)
+    with stored_on_full_disk(store, "simulation"):
+        with interruptible(path, quiet, f"; the same command continues from {store}") as work:
+            tree = fit_traces(traces, plan, store=store, executor=workers, **work._asdict())
+        writing.write(tree, path)
     Store(store, "simulations").remove()
     return tree
 

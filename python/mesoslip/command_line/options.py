@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, Protocol, TypeVar
 
 import typer
 
+from mesoslip.errors import WriteError
+
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
     from mesoslip.execution.executors import ExecutorLike
@@ -245,6 +247,21 @@ def interruptible(
         except StoppedError:
             say(f"{path}: interrupted{hint}")
             raise typer.Exit(stop.exit_status) from None
+
+
+@contextmanager
+def stored_on_full_disk(store: Path, noun: str) -> Iterator[None]:
+    """Add to the error of a full disk how many pieces of the work a store has."""
+    from mesoslip.execution.store import Pieces
+
+    try:
+        yield
+    except WriteError as error:
+        kept = len(Pieces(store).names())
+        if not kept:
+            raise
+        stored = f"{counted(kept, noun)} {'is' if kept == 1 else 'are'} stored"
+        raise WriteError(f"{error}; {stored}: the same command continues") from error
 
 
 def counted(count: float, noun: str) -> str:

@@ -15,10 +15,10 @@ from mesoslip.command_line.options import (
     SetOption,
     counted,
     executor_of,
+    stored_on_full_disk,
     workers_option,
 )
 from mesoslip.command_line.progress import progress_shown, say
-from mesoslip.errors import WriteError
 from mesoslip.execution.stop import Stop, stopped_by_signals
 
 if TYPE_CHECKING:
@@ -67,14 +67,13 @@ def sweep(
         _print_estimate(plan, folder, workers)
         return
     targets.check_output(path, [file])
-    with Store(folder, "points") as store, stopped_by_signals() as stop:
-        try:
-            with progress_shown(quiet) as progress:
-                done = run_sweep(plan, store=store, executor=executor, progress=progress, stop=stop)
-        except WriteError as error:
-            kept = len(store.names())
-            stored = f"{counted(kept, 'point')} {'is' if kept == 1 else 'are'} stored"
-            raise WriteError(f"{error}; {stored}: the same command continues") from error
+    with (
+        stored_on_full_disk(folder, "point"),
+        Store(folder, "points") as store,
+        stopped_by_signals() as stop,
+    ):
+        with progress_shown(quiet) as progress:
+            done = run_sweep(plan, store=store, executor=executor, progress=progress, stop=stop)
         status = _write(done, path, stop)
     _report(done, path, quiet)
     if status:

@@ -45,6 +45,18 @@ def trace(
         ),
     ] = None,
     decimal: Annotated[str | None, option("Decimal sign, if the file allows two", "','")] = None,
+    dates: Annotated[
+        str | None,
+        option("Order of day, month, year in dates such as 04/03/2026: dmy, mdy, ymd", "ORDER"),
+    ] = None,
+    missing: Annotated[
+        str | None,
+        option(
+            "Numbers that stand for missing ones, or none; those such as -9999 that lie far "
+            "from all others by default",
+            "NUMBERS",
+        ),
+    ] = None,
     sheet: Annotated[
         str | None, option("Sheet of a workbook; that with the most numbers by default", "NAME")
     ] = None,
@@ -72,6 +84,13 @@ def trace(
         str | None,
         option(
             "Whether the drive goes back and forth: strokes, one-way; found by default", "MOTION"
+        ),
+    ] = None,
+    force_direction: Annotated[
+        str | None,
+        option(
+            "Direction of the force in strokes: along, against the motion; found by default",
+            "DIRECTION",
         ),
     ] = None,
     normal_force: Annotated[

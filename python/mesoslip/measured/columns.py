@@ -290,7 +290,11 @@ def _from_headings(table: Table, headings: Mapping[int, Heading], found: Assignm
             by_quantity.setdefault(heading.quantity, []).append(index)
     either = by_quantity.pop(EITHER, [])
     has_force = not found.used.keys().isdisjoint(FORCES)
-    names = {index: bare_name(table.headers[index]) for index, one in headings.items() if one.unit}
+    names = {
+        index: bare_name(table.headers[index])
+        for index, one in headings.items()
+        if one.unit and one.quantity is None
+    }
     loads = [index for index, name in names.items() if name in {"load", "load cell"}]
     is_normal = has_force or bool(set(FORCES) & by_quantity.keys())
     if len(loads) == 1 and "normal_force" not in by_quantity:
@@ -354,7 +358,9 @@ def _same_clock(one: Array, other: Array) -> bool:
     known = np.isfinite(one) & np.isfinite(other)
     if np.count_nonzero(known) < 2:
         return False
-    step = max(float(np.median(np.abs(np.diff(row[known])))) for row in (one, other))
+    steps = [np.abs(np.diff(row[known])) for row in (one, other)]
+    # Rounded times are equal in several rows.
+    step = max(float(np.median(row[row > 0])) if row.any() else 0.0 for row in steps)
     return float(np.ptp(one[known] - other[known])) <= 2 * step
 
 
@@ -443,10 +449,15 @@ def _continues(values: Array, rows: NDArray[np.intp], usual: float) -> NDArray[n
     return np.asarray(np.fmin(steps[rows], steps[rows + 1]) <= usual)
 
 
-def sentinels(table: Table, used: Used) -> tuple[NDArray[np.bool], str]:
-    """Numbers that stand for missing ones in a column, and a note about them."""
+def sentinels(
+    table: Table, used: Used, given: Sequence[float] | None = None
+) -> tuple[NDArray[np.bool], str]:
+    """Numbers that stand for missing ones in a column, given or guessed, and a note about them."""
     values = table.values[used.index]
     finite = np.isfinite(values)
+    if given is not None:
+        found = finite & np.isin(values, given)
+        return found, _taken_as_missing(table, used, found)
     found = finite & (np.abs(values) >= MIN_ALWAYS)
     known = finite & np.isin(values, SENTINELS)
     rest = values[finite & ~known & ~found]
@@ -463,13 +474,23 @@ def sentinels(table: Table, used: Used) -> tuple[NDArray[np.bool], str]:
         if near.any() and not found.any():
             return found, (
                 f"guess: column {shown(table.headers[used.index])}: {values[near][0]:g} on "
-                f"{table.row} {listed(table.lines[near].tolist())} is used as a number"
+                f"{table.row} {listed(table.lines[near].tolist())} is used as a number "
+                "(--missing)"
             )
+    note = _taken_as_missing(table, used, found)
+    # Larger numbers cannot be samples.
+    is_guess = bool((np.abs(values[found]) < MIN_ALWAYS).any())
+    return found, f"guess: {note} (--missing)" if is_guess else note
+
+
+def _taken_as_missing(table: Table, used: Used, found: NDArray[np.bool]) -> str:
+    """A note about numbers that stand for missing ones; empty without such numbers."""
     if not found.any():
-        return found, ""
-    shown_values = ", ".join(f"{one:g}" for one in np.unique(values[found])[:3])
+        return ""
+    values = np.unique(table.values[used.index][found])
+    shown_values = ", ".join(f"{one:g}" for one in values[:3])
     lines = listed(table.lines[found].tolist())
-    return found, (
+    return (
         f"column {shown(table.headers[used.index])}: {shown_values} taken as missing in "
         f"{int(found.sum())} {table.row}s: {lines}"
     )

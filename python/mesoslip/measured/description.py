@@ -17,7 +17,10 @@ from mesoslip.configuration.messages import problems
 from mesoslip.configuration.table import Table, Text, Whole, problem
 from mesoslip.configuration.units import is_number, number_of, text_to_si, to_si
 from mesoslip.errors import ConfigError, Problem, shown
+from mesoslip.measured.reading.stamps import Order
 
+# In place of numbers that stand for missing ones.
+NO_NUMBER = "none"
 # Maximum size of a quantity in SI, so that derived quantities do not overflow.
 MAX_SIZE = 1e30
 
@@ -107,6 +110,18 @@ def _number_as_text(value: object) -> object:
     return value if isinstance(value, bool) or not isinstance(value, int | float) else repr(value)
 
 
+def _missing_numbers(value: object) -> object:
+    """Numbers between commas, or "none"."""
+    text = _number_as_text(value)
+    if isinstance(text, str) and text != NO_NUMBER:
+        for one in text.split(","):
+            try:
+                number_of(one.strip())
+            except ValueError:
+                raise ValueError(f"must be numbers between commas, or {NO_NUMBER!r}") from None
+    return text
+
+
 class Column(Table):
     """A column of the file, and how its numbers become a quantity: (number - offset) x factor."""
 
@@ -169,6 +184,12 @@ class TraceDescription(Table):
     """Headers instead of those of the file, such as "time [s], force [uN], -"."""
     decimal: Literal[".", ","] | None = None
     """Decimal sign; by default found from the numbers, if they allow one only."""
+    dates: Order | None = None
+    """Order of day, month and year in dates such as 04/03/2026; by default the one in which times
+    increase."""
+    missing: Annotated[Text, BeforeValidator(_missing_numbers)] | None = None
+    """Numbers that stand for missing ones, such as "-99, 0", or "none", in columns other than the
+    time; by default numbers such as -9999 that lie far from all others."""
     sheet: Text | None = None
     """Sheet of a workbook (.xlsx); by default the one with the most numbers."""
     rate: Rate | None = None
@@ -193,6 +214,9 @@ class TraceDescription(Table):
     """Spring constant; for friction coefficients over displacement, such as "1.6e-3 1/um"."""
     motion: Literal["strokes", "one-way"] | None = None
     """Whether the drive goes back and forth; by default from the load point or the force."""
+    force_direction: Literal["along", "against"] | None = None
+    """Whether the force in strokes is along the motion, or against it as that of the drive on the
+    sensor; by default such that loops lose energy."""
     velocity: Velocity | None = None
     """Velocity of the drive, where no load point was recorded."""
     hum: Frequency | None = None
@@ -228,6 +252,14 @@ class TraceDescription(Table):
             except ValueError:
                 continue
         raise AssertionError(name)
+
+    @property
+    def missing_numbers(self) -> list[float] | None:
+        """Numbers that stand for missing ones; None if they are not given."""
+        if self.missing is None:
+            return None
+        texts = [] if self.missing == NO_NUMBER else self.missing.split(",")
+        return [number_of(one.strip()) for one in texts]
 
     def is_in(self, name: str, unit: str) -> bool:
         """Whether a quantity is given with a unit of the dimension of an SI unit."""

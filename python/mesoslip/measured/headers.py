@@ -45,7 +45,7 @@ NAMES = {
     "|shear stress normal stress|ff fn|traction|traction coefficient|traction coeff",
     "normal_force": "normal|normal force|normal load|normalforce|normalload|fn|f n|vertical force"
     "|vertical load|normalkraft|force normal|force n|fz|f z|nload|applied load|axial load"
-    "|axial force|ball load|belastung",
+    "|axial force|ball load|belastung|force normale|charge normale|fuerza normal|forza normale",
     "normal_stress": "normal stress|normalstress|sigma n|sigman|sigma|σ|σn|sn"
     "|effective normal stress|eff normal stress|norm stress|stress normal|sigma eff",
     "load_point": "load point|loadpoint|load point displacement|load point disp|load point displ"

@@ -83,7 +83,7 @@ def read_record(paths: Sequence[Path], trace: TraceDescription) -> Record:
     values, notes = {}, []
     for name, used in columns.used.items():
         values[name] = values_of(table, name, used)
-        missing, note = sentinels(table, used)
+        missing, note = sentinels(table, used, trace.missing_numbers if name != "time" else None)
         if missing.any():
             values[name] = np.where(missing, np.nan, values[name])
         notes += [note] if note else []
@@ -161,9 +161,20 @@ def _read(path: Path, trace: TraceDescription) -> Table:
     rate = trace.si("rate")
     has_headers = trace.headers is not None or bool(trace.columns.model_fields_set)
     read: Callable[..., Any] = read_file if rate is None else blocks_of
-    found = read(path, decimal=trace.decimal, sheet=trace.sheet, has_headers=has_headers)
+    found = read(
+        path,
+        decimal=trace.decimal,
+        dates=trace.dates,
+        sheet=trace.sheet,
+        has_headers=has_headers,
+    )
     if rate is not None:
-        found = thinned(found, rate, lambda one: assign(one, trace.columns, trace.headers))
+        found = thinned(
+            found,
+            rate,
+            lambda one: assign(one, trace.columns, trace.headers),
+            trace.missing_numbers,
+        )
     table: Table = found
     return table
 

@@ -35,7 +35,7 @@ def joined(tables: Sequence[Table]) -> Table:
         values=np.hstack([one.values for one in tables]),
         lines=np.concatenate([one.lines for one in tables]),
         bad=bad,
-        notes=[f"{one.path.name}: {note}" for one in tables for note in one.notes],
+        notes=[_of_part(one.path.name, note) for one in tables for note in one.notes],
     )
 
 
@@ -56,6 +56,12 @@ def continued(time: Array, tables: Sequence[Table]) -> tuple[Array, list[str]]:
             f"{before.path.name}"
         )
     return time, notes
+
+
+def _of_part(name: str, note: str) -> str:
+    """A note of a part with its name; a guess begins as one."""
+    rest = note.removeprefix("guess: ")
+    return f"{'guess: ' if rest != note else ''}{name}: {rest}"
 
 
 def _names(table: Table) -> str:

@@ -172,9 +172,10 @@ def _one_part(
             f"{position} {row}s {lines[one].min()} to {lines[one].max()}"
             for position, one in enumerate(whole[:NAMED], 1)
         )
+        guess = "guess: " if part is None else ""
         notes.append(
-            f"the clock starts again: {len(whole)} parts ({shown}); part {chosen + 1} is used, "
-            "another one with --part"
+            f"{guess}the clock starts again: {len(whole)} parts ({shown}); part {chosen + 1} is "
+            "used, another one with --part"
         )
     return whole[chosen]
 

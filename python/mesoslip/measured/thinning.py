@@ -6,7 +6,7 @@ new rate, and below 1e-4 from half of it on, so that nothing is folded into the 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain
 
@@ -29,8 +29,17 @@ BETA, CUTOFF = 8.0, 0.75
 MIN_GAP, MAX_GAPS = 1.5, 0.01
 
 
-def thinned(blocks: Iterator[Table], rate: float, assigned: Callable[[Table], Assignment]) -> Table:
-    """The table of all blocks, with samples at about a rate [1/s] if it has a column of times."""
+def thinned(
+    blocks: Iterator[Table],
+    rate: float,
+    assigned: Callable[[Table], Assignment],
+    missing: Sequence[float] | None = None,
+) -> Table:
+    """The table of all blocks, with samples at about a rate [1/s] if it has a column of times.
+
+    ``assigned`` finds the used columns of a table; ``missing`` are given numbers for missing ones,
+    in columns other than the time.
+    """
     first = next(blocks)
     used = assigned(first).used
     if "time" not in used:
@@ -54,9 +63,9 @@ def thinned(blocks: Iterator[Table], rate: float, assigned: Callable[[Table], As
 
     def cleaned() -> Iterator[Table]:
         for table in chain([first], blocks):
-            for one in used.values():
-                missing, _ = sentinels(table, one)
-                table.values[one.index, missing] = np.nan
+            for name, one in used.items():
+                found, _ = sentinels(table, one, missing if name != "time" else None)
+                table.values[one.index, found] = np.nan
             yield table
 
     parts = [thinner.feed(one) for one in cleaned()]
@@ -87,7 +96,7 @@ def _joined(tables: list[Table], *notes: str) -> Table:
         values=np.hstack([one.values for one in tables]),
         lines=np.concatenate([one.lines for one in tables]),
         bad=bad,
-        notes=[*tables[0].notes, *notes],
+        notes=[*dict.fromkeys(note for one in tables for note in one.notes), *notes],
     )
 
 

@@ -162,6 +162,8 @@ def read_trace(
     *,
     columns: str | None = None,
     decimal: str | None = None,
+    dates: str | None = None,
+    missing: str | float | None = None,
     sheet: str | None = None,
     rate: str | float | None = None,
     velocity: str | float | None = None,
@@ -169,6 +171,7 @@ def read_trace(
     radius: str | float | None = None,
     viscosity: str | float | None = None,
     motion: str | None = None,
+    force_direction: str | None = None,
     normal_force: str | float | None = None,
     normal_stress: str | float | None = None,
     area: str | float | None = None,
@@ -196,6 +199,10 @@ def read_trace(
         Headers instead of those of the file, such as "time [s], force [uN], -".
     decimal
         Decimal sign, "." or ",", if the file allows both.
+    dates
+        Order of day, month and year in dates such as 04/03/2026: "dmy", "mdy" or "ymd".
+    missing
+        Numbers that stand for missing ones, such as "-99, 0", or "none".
     sheet
         Sheet of a workbook (.xlsx); by default the one with the most numbers.
     rate
@@ -211,6 +218,8 @@ def read_trace(
         Viscosity of a lubricant [Pa s], for Stribeck curves.
     motion
         "strokes" or "one-way": whether the drive goes back and forth, if the guess is wrong.
+    force_direction
+        "along" or "against": the direction of the force in strokes, if the guess is wrong.
     normal_force
         Normal force [N]; friction coefficients become forces with it.
     normal_stress, area

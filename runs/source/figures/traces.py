@@ -6,8 +6,7 @@ from typing import Any
 
 import xarray as xr
 from matplotlib.axes import Axes
-from mesoslip.plots.extent import EVERYTHING
-from mesoslip.plots.extent import line
+from mesoslip.plots.extent import EVERYTHING, line
 
 # Units of variables, in SI: µN, µm/s, 1.
 UNITS = {

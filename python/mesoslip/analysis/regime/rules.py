@@ -116,8 +116,8 @@ def classify(
     result = RegimeResult(force_scale=scales.force_scale, **numbers)  # type: ignore[arg-type]
     regular = SMOOTH_AMPLITUDE * scale / static
     judged = result
-    if scales.is_measured and are_slips:
-        # Slips that stand out of the noise are no smooth sliding, however small.
+    if scales.is_measured and (are_slips or (len(slips) and len(cycles.periods) < MIN_CYCLES)):
+        # Slips that stand out of the noise are no smooth sliding, however small and few.
         judged, regular = replace(result, smooth_amplitude=0.0), 0.0
     regime = _regime(
         judged, [one / static for one in halves], regular=regular, is_renewed=is_renewed

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -110,6 +111,8 @@ class Strokes:
     records: Sequence[StrokeRecord] = ()
     strokes: Sequence[Sequence[Stroke]] = ()
     """Records and strokes by realization."""
+    min_friction: Measured | None = None
+    """Lower limit of the friction of sliding, if the force grows up to the end of strokes."""
 
     def rows(self, group: str) -> list[dict[str, Any]]:
         """A dictionary for each stroke or cycle; None for unknown values."""
@@ -158,6 +161,8 @@ class Strokes:
             "strokes": self.rows("strokes"),
             "cycles": self.rows("cycles"),
             "overall": {name: asdict(one) for name, one in self.overall.items()},
+            "min_friction": self.min_friction
+            and {"mean": self.min_friction.value, "error": self.min_friction.error},
         }
 
 
@@ -206,6 +211,7 @@ def strokes_of(
         cycles.append(own_cycles)
     if not any(found):
         raise FileError(f"{name}: has no whole stroke with enough samples in its middle")
+    limit = _min_friction(found)
     means = {key: overall([getattr(one, key) for one in cycles[0]]) for key in OVERALL}
     return Strokes(
         {"strokes": _columns(STROKES, found), "cycles": _columns(CYCLES, cycles)},
@@ -213,13 +219,27 @@ def strokes_of(
         middle,
         unit,
         records[0].source,
-        (*([guess] if guess else []), *_notes(records[0], found)),
+        (*([guess] if guess else []), *_notes(records[0], found, limit, unit)),
         records,
         found,
+        limit,
     )
 
 
-def _notes(record: StrokeRecord, strokes: Sequence[Sequence[Stroke]]) -> Iterator[str]:
+def _min_friction(strokes: Sequence[Sequence[Stroke]]) -> Measured | None:
+    """Half the swing of the force in strokes that do not slide; None without such strokes."""
+    swings = [
+        abs(one.end_force - one.start_force) for own in strokes for one in own if not one.slides
+    ]
+    if not swings:
+        return None
+    error = float(np.std(swings)) / math.sqrt(max(len(swings) - 1, 1))
+    return Measured(0.5 * float(np.mean(swings)), 0.5 * error)
+
+
+def _notes(
+    record: StrokeRecord, strokes: Sequence[Sequence[Stroke]], limit: Measured | None, unit: str
+) -> Iterator[str]:
     """Sentences on what was found, with guesses."""
     yield (
         f"{record.noun} by the {record.source}: {len(strokes[0])} whole ones; those at either end "
@@ -227,13 +247,17 @@ def _notes(record: StrokeRecord, strokes: Sequence[Sequence[Stroke]]) -> Iterato
     )
     yield from record.notes
     count = sum(not one.slides for own in strokes for one in own)
-    if count:
+    if limit is not None:
         what = (
             "friction is unknown without a displacement"
             if record.position is None
             else "the mean is that of the middle, with the reversal"
         )
-        yield f"in {count} strokes the force grows up to the end, as with partial slip: {what}"
+        yield (
+            f"in {count} strokes the force grows up to the end, as with partial slip: {what}; that "
+            f"of sliding is at least {with_error(limit.value, limit.error, unit)}, half the swing "
+            "of the force"
+        )
 
 
 def _columns(

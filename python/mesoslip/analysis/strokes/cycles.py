@@ -11,8 +11,7 @@ import numpy as np
 
 from mesoslip.analysis.steady_force import NORMAL_95, steady_mean, transient
 from mesoslip.analysis.strokes.measure import Measured, Stroke
-from mesoslip.analysis.strokes.record import StrokeRecord
-from mesoslip.array_types import Array
+from mesoslip.analysis.strokes.record import StrokeRecord, loop_area
 
 # Minimum number of cycles for a drift, and for the length of the running-in.
 MIN_DRIFT, MIN_RUNNING_IN = 4, 10
@@ -85,21 +84,14 @@ def _loop_energy(record: StrokeRecord, one: Stroke, two: Stroke) -> Measured:
         return Measured()
     samples = slice(one.piece.first, min(two.piece.after + 1, record.time.size))
     x, force = record.position[samples], record.force[samples]
-    force = force - force.mean()
-    energy = _area(x, force)
+    energy = loop_area(x, force)
     dx, dy = (0.5 * (np.roll(row, -1) - np.roll(row, 1)) for row in (x, force))
     by_noise = math.hypot(
         record.noise * math.sqrt(record.variance_ratio * float(dx @ dx)),
         record.position_noise * float(np.linalg.norm(dy)),
     )
-    coarse = 0.5 * sum(_area(x[part::2], force[part::2]) for part in range(2))
+    coarse = 0.5 * sum(loop_area(x[part::2], force[part::2]) for part in range(2))
     return Measured(energy, by_noise, (energy - coarse) / 3).over(record.sign)
-
-
-def _area(x: Array, force: Array) -> float:
-    """Integral of force dx around a polygon."""
-    after = np.roll(x, -1)
-    return float(0.5 * (force + np.roll(force, -1)) @ (after - x))
 
 
 @dataclass(frozen=True)

@@ -28,6 +28,9 @@ MIN_SAMPLES = 3
 # level of sliding is, the minimum share of the middle without reversal, and the maximum slope of
 # the force there, over that of the reversal, and growth over its swing.
 REVERSAL, LAST, MIN_SLIDING, MAX_SLOPE, MAX_GROWTH = 1.1, 1 / 4, 0.15, 0.1, 0.25
+# Maximum length of a reversal over the stroke without a position: a rest is like sliding, and more
+# may be all of the motion.
+MAX_REVERSAL = 0.5
 # Minimum fall of a slip, over the noise and over the swing: it shows that a shorter part slides, in
 # which the force grows or falls by as much, depending on where slips start and end.
 MIN_FALL = (6.0, 0.05)
@@ -123,6 +126,8 @@ def measure(
         share = float(position[after - 1] - position[start]) / max(float(position[end]), 1e-300)
         growth = _growth(position[start:after], along[start:after]) - fall
         slides = growth / swing < min(MAX_GROWTH, MAX_SLOPE * REVERSAL * share)
+        if record.position is None and fall == 0 and end < position.size:
+            slides &= float(position[end]) <= MAX_REVERSAL
     if slides:
         start += _transient(along[start:after])
     inside = slice(start if slides else first, after)

@@ -9,13 +9,16 @@ from functools import cached_property
 import numpy as np
 
 from mesoslip.analysis.noise import noise_level, without_impulses
-from mesoslip.analysis.strokes.segments import FORCE, POSITIONS, Piece, output_pieces
+from mesoslip.analysis.strokes.segments import FORCE, POSITIONS, Piece, given_in, output_pieces
 from mesoslip.analysis.strokes.sliding import polarity
 from mesoslip.array_types import Array
 from mesoslip.errors import FileError
 from mesoslip.output.access import group_of
 from mesoslip.output.arrays import Tree
 from mesoslip.output.variables import force_among
+
+# Direction of the force that is given.
+AGAINST = "against"
 
 
 @dataclass(frozen=True)
@@ -40,11 +43,22 @@ class StrokeRecord:
     """What the pieces are."""
     remarks: tuple[str, ...] = ()
     """Sentences on the pieces."""
+    direction: str | None = None
+    """Direction of the force, `AGAINST` or along the motion, if it is given."""
 
     @cached_property
     def sign(self) -> float:
-        """+1 if the force is positive along the motion, -1 if it is against it."""
-        return polarity(self.force, self.pieces)
+        """+1 if the force is positive along the motion, -1 if it is against it.
+
+        Along the motion loops lose energy; without a position the force in the pieces decides.
+        """
+        if self.direction is not None:
+            return -1.0 if self.direction == AGAINST else 1.0
+        whole = self.pieces[1:-1]
+        if self.position is None or len(whole) < 2:
+            return polarity(self.force, self.pieces)
+        cycles = slice(whole[0].first, whole[2 * (len(whole) // 2) - 1].after)
+        return -1.0 if loop_area(self.position[cycles], self.force[cycles]) < 0 else 1.0
 
     @cached_property
     def position_noise(self) -> float:
@@ -78,10 +92,14 @@ class StrokeRecord:
         found = list(self.remarks)
         if self.source == FORCE:
             found.append(
-                "guess: strokes are those of the sign of the force, as no displacement is known"
+                "guess: strokes are those of the sign of the force, as no displacement is known "
+                "(trace --motion)"
             )
-        elif self.sign < 0:
-            found.append("guess: the force is against the motion, as of the drive on the sensor")
+        elif self.sign < 0 and self.direction is None:
+            found.append(
+                "guess: the force is against the motion, as of the drive on the sensor "
+                "(trace --force-direction)"
+            )
         return found
 
 
@@ -130,7 +148,16 @@ def record_in(
         )
     kept = tuple(one._replace(after=min(one.after, count)) for one in pieces if one.first < count)
     noise_of = (white, correlated, correlation_time)
-    return StrokeRecord(time, force, position, normal, kept, source, *noise_of, noun, remarks)
+    direction = given_in(tree, "force_direction")
+    return StrokeRecord(
+        time, force, position, normal, kept, source, *noise_of, noun, remarks, direction
+    )
+
+
+def loop_area(x: Array, force: Array) -> float:
+    """Integral of force dx around a polygon of samples."""
+    force = force - force.mean()
+    return float(0.5 * (force + np.roll(force, -1)) @ (np.roll(x, -1) - x))
 
 
 def _whole(time: Array, values: Array) -> Array:

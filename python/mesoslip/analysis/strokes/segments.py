@@ -38,13 +38,19 @@ MIN_BACK = 0.05
 # Maximum distance from an extreme at which the displacement rests, over the swing.
 REST = 0.002
 # The force without a displacement: quantiles that are its levels, minimum ratio of the smaller to
-# the larger, and part of the distance from their middle to them that a change of sign exceeds.
-LEVELS, MIN_RATIO, BEYOND = (0.1, 0.9), 0.1, 0.5
+# the larger, negative for levels of one sign, and part of the distance from their middle to them
+# that a change of level exceeds.
+LEVELS, MIN_RATIO, BEYOND = (0.1, 0.9), -0.2, 0.5
 # Limits of the time in which the force leaves its level, over that at its rate after it.
 TIMES = (2.2, 0.5)
-# Maximum ratio of the times of rises and falls, minimum share of the time at the levels, and
-# minimum number of changes of the sign.
-MAX_ASYMMETRY, MIN_SHARE, MIN_CHANGES = 4.0, 0.45, 4
+# Noise over the distance to the levels that smoothing leaves, and maximum share of a period over
+# which the force is smoothed.
+MAX_NOISE, SMOOTHED = 0.03, 1 / 32
+# Minimum share of the time at the levels, and minimum number of changes from one to the other.
+MIN_SHARE, MIN_CHANGES = 0.45, 4
+# Minimum correlation with the mirrored force after half a period, in windows of some periods, each
+# of which is known within a share.
+MIN_MIRRORED, PERIODS, PERIOD_ERROR = 0.85, 3, 0.05
 
 
 class Piece(NamedTuple):
@@ -95,8 +101,14 @@ def output_pieces(tree: Tree, realization: int = 0) -> tuple[tuple[Piece, ...] |
     )
     # Forces are missing after the end of an interrupted run only.
     known = np.isfinite(force)
-    motion = tomllib.loads(tree.attrs.get("trace", "")).get("trace", {}).get("motion")
+    motion = given_in(tree, "motion")
     return record_pieces(root["time"].values[known], force[known], drive, displacement, motion)
+
+
+def given_in(tree: Tree, key: str) -> str | None:
+    """A key of the description of a measured trace; None if it was not given."""
+    value: str | None = tomllib.loads(tree.attrs.get("trace", "")).get("trace", {}).get(key)
+    return value
 
 
 def back_and_forth(count: int, name: str) -> str:
@@ -149,47 +161,77 @@ def pieces_of_force(
 ) -> tuple[Piece, ...] | None:
     """Pieces guessed from the sign of a force; None if it does not look like friction in strokes.
 
-    If it is given that they are strokes, the force needs two levels only, of any sign.
-
-    The force has levels of opposite signs, at which it is most of the time, and passes from one to
-    the other about as fast as back. Slips fall faster than the force rises.
+    The force has two levels, at which it is most of the time, and is mirrored in their middle after
+    half a period. Slips fall faster than the force rises. The levels have opposite signs; one may
+    be about zero, as with partial slip and an offset, and both may have any sign if strokes are
+    given.
     """
     if force.size < 4 * MIN_CHANGES:
         return None
     low, high = (float(one) for one in np.quantile(force, LEVELS))
-    is_signed = low < 0 < high and min(-low, high) >= MIN_RATIO * max(-low, high)
-    if not (is_signed or is_given):
+    if not (is_given or min(-low, high) >= MIN_RATIO * max(-low, high)):
         return None
     middle, half = (low + high) / 2, (high - low) / 2
     level = noise_level(force)
     if 2 * half * (1 - BEYOND) < _range_of_noise(force, level) / 2:
         return None
-    side = np.where(force > middle + BEYOND * half, 1, 0)
-    side[force < middle - BEYOND * half] = -1
-    beyond = np.flatnonzero(side)
-    change = np.flatnonzero(np.diff(side[beyond]))
-    if change.size < MIN_CHANGES or (beyond.size < MIN_SHARE * force.size and not is_given):
+    last, next_one, sides = _changes(force, middle, BEYOND * half)
+    at_levels = float(np.mean(np.abs(force - middle) > BEYOND * half))
+    if last.size < MIN_CHANGES or (at_levels < MIN_SHARE and not is_given):
         return None
-    last, next_one = beyond[change], beyond[change + 1]
-    took = time[next_one] - time[last]
-    rising = side[next_one] > 0
-    rise, fall = float(np.median(took[rising])), float(np.median(took[~rising]))
-    if not (is_given or 1 / MAX_ASYMMETRY <= rise / fall <= MAX_ASYMMETRY):
+    if not (is_given or _mirrored(time, force, next_one[::2]) >= MIN_MIRRORED):
         return None
-    noise = 3 * level
+    # Means over a small part of a period have less noise.
+    width = int(min((level / (MAX_NOISE * half)) ** 2, SMOOTHED * 2 * force.size / last.size)) or 1
+    if width > 1:
+        force = np.convolve(np.pad(force, width // 2, "edge"), np.full(width, 1 / width), "same")
+        force = force[width // 2 : width // 2 + time.size]
+        level *= min(1.0, 2 / math.sqrt(width))
+        last, next_one, sides = _changes(force, middle, BEYOND * half)
     # The force leaves its level as long before as it would take at this rate.
     bounds: list[int] = []
-    for one, two in zip(last.tolist(), next_one.tolist(), strict=True):
+    for one, two, side in zip(last.tolist(), next_one.tolist(), sides.tolist(), strict=True):
         rest = (1 - BEYOND) / (2 * BEYOND) * (two - one)
-        start, end = (max(0, one - round(share * rest)) for share in TIMES)
-        part = side[one] * force[start : end + 1]
-        bounds.append(start + int(np.flatnonzero(part >= part.max() - noise)[-1]))
+        before = bounds[-1] + 1 if bounds else 0
+        start, end = (max(before, one - round(share * rest)) for share in TIMES)
+        part = side * force[start : end + 1]
+        bounds.append(start + int(np.flatnonzero(part >= part.max() - 3 * level)[-1]))
     ends = [0, *bounds, force.size]
-    first = int(side[last[0]])
+    first = int(sides[0])
     return tuple(
         Piece(begin, end, first * (-1) ** number)
         for number, (begin, end) in enumerate(pairwise(ends))
+        if begin < end
     )
+
+
+def _changes(force: Array, middle: float, reach: float) -> tuple[Samples, Samples, Samples]:
+    """Last samples before and first samples after changes of the level, and the side before, 1 or
+    -1."""
+    side = np.where(force > middle + reach, 1, 0)
+    side[force < middle - reach] = -1
+    beyond = np.flatnonzero(side)
+    change = np.flatnonzero(np.diff(side[beyond]))
+    return beyond[change], beyond[change + 1], side[beyond[change]]
+
+
+def _mirrored(time: Array, force: Array, starts: Samples) -> float:
+    """Correlation of a force with the mirrored one after half a period; samples start periods."""
+    count = min(PERIODS, starts.size - 1)
+    found = []
+    for first, after in pairwise(starts[::count].tolist() if count > 0 else []):
+        size = after - first
+        even = np.linspace(time[first], time[after], size, endpoint=False)
+        values = np.interp(even, time[first:after], force[first:after])
+        values -= values.mean()
+        lags = np.linspace(1 - PERIOD_ERROR, 1 + PERIOD_ERROR, 11) * size / (2 * count)
+        products = [
+            float(values[one:] @ values[:-one]) / (size - one)
+            for one in np.unique(lags.astype(int)).tolist()
+            if 0 < one < size
+        ]
+        found.append(-min(products, default=0.0) * size / max(float(values @ values), 1e-300))
+    return float(np.median(found)) if found else 0.0
 
 
 def _range_of_noise(values: Array, level: float) -> float:

@@ -20,6 +20,7 @@ from mesoslip.measured.reading.source import (
     check_file,
     text_of,
 )
+from mesoslip.measured.reading.stamps import Order
 from mesoslip.measured.reading.table import BadCell, Table
 from mesoslip.measured.reading.text import read_text
 
@@ -32,7 +33,12 @@ WHOLE = (b"PK", b"\xff\xfe", b"\xfe\xff", *(one.start for one in READERS))
 
 
 def blocks_of(
-    path: Path, *, decimal: str | None = None, has_headers: bool = False, sheet: str | None = None
+    path: Path,
+    *,
+    decimal: str | None = None,
+    dates: Order | None = None,
+    has_headers: bool = False,
+    sheet: str | None = None,
 ) -> Iterator[Table]:
     """The tables of the blocks of a file; one that is not read in parts is a block. See
     `read_file`."""
@@ -46,7 +52,7 @@ def blocks_of(
             yield from binary_blocks(reader, path, file, BLOCK)
         return
     if sheet is not None or head.startswith(WHOLE):
-        yield read_file(path, decimal=decimal, has_headers=has_headers, sheet=sheet)
+        yield read_file(path, decimal=decimal, dates=dates, has_headers=has_headers, sheet=sheet)
         return
     above = b""
     lines = 0
@@ -56,7 +62,11 @@ def blocks_of(
             size = os.fstat(file.fileno()).st_size
             for data in _pieces(stream):
                 text = text_of(path, data, "text")
-                table = read_text(path, above + text, decimal=decimal, has_headers=has_headers)
+                table = read_text(
+                    path, above + text, decimal=decimal, dates=dates, has_headers=has_headers
+                )
+                # Blocks below are read as those above.
+                dates = table.dates
                 if above:
                     table = _below(table, lines - above.count(NEWLINE))
                 else:
@@ -94,5 +104,5 @@ def _below(table: Table, shift: int) -> Table:
         values=table.values[:, 1:],
         lines=table.lines[1:] + shift,
         bad={column: moved(cells) for column, cells in table.bad.items()},
-        notes=[],
+        notes=[one for one in table.notes if one.startswith("guess: ")],
     )

@@ -13,6 +13,7 @@ from mesoslip.measured.reading import binary, tdms
 from mesoslip.measured.reading.binary import read_binary
 from mesoslip.measured.reading.source import bytes_of, text_of
 from mesoslip.measured.reading.spreadsheet import MEMBER, text_of_workbook
+from mesoslip.measured.reading.stamps import Order
 from mesoslip.measured.reading.table import Table
 from mesoslip.measured.reading.text import read_text
 
@@ -21,17 +22,23 @@ READERS = (*binary.READERS, tdms.READER)
 
 
 def read_file(
-    path: Path, *, decimal: str | None = None, has_headers: bool = False, sheet: str | None = None
+    path: Path,
+    *,
+    decimal: str | None = None,
+    dates: Order | None = None,
+    has_headers: bool = False,
+    sheet: str | None = None,
 ) -> Table:
     """Read a file of text, which may be compressed, a workbook, or a format of `READERS`.
 
-    By default the decimal sign of a text is found from its numbers. ``has_headers`` is whether
-    there are other headers than those of the file; ``sheet`` is that of a workbook.
+    By default the decimal sign of a text and the order of its dates are found from its numbers.
+    ``has_headers`` is whether there are other headers than those of the file; ``sheet`` is that of
+    a workbook.
     """
     data = bytes_of(path)
     if _is_workbook(data):
         text, note = text_of_workbook(path, data, sheet)
-        table = read_text(path, text, decimal=decimal, has_headers=has_headers)
+        table = read_text(path, text, decimal=decimal, dates=dates, has_headers=has_headers)
         # The first note is about delimiters, which a workbook does not have.
         return replace(table, notes=[note, *table.notes[1:]])
     if sheet is not None:
@@ -43,7 +50,7 @@ def read_file(
         raise FileError(f"{path}: is a configuration, not a measurement")
     others = ", ".join(dict.fromkeys(one.kind for one in READERS))
     text = text_of(path, data, f"a workbook (.xlsx), {others}")
-    return read_text(path, text, decimal=decimal, has_headers=has_headers)
+    return read_text(path, text, decimal=decimal, dates=dates, has_headers=has_headers)
 
 
 def _is_workbook(data: bytes) -> bool:

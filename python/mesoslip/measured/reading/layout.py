@@ -17,12 +17,12 @@ from mesoslip.measured.headers import BRACKETS, read_header
 from mesoslip.measured.reading.cells import (
     COMMENT,
     DELIMITERS,
-    STAMP_FORM,
     is_missing,
     is_number,
     may_group,
     split,
 )
+from mesoslip.measured.reading.stamps import STAMP_FORM
 from mesoslip.measured.units import is_unit
 
 # Number of lines from which the layout is found.
@@ -221,8 +221,17 @@ def _header(
                 names = header_cells(lines[other], guess.delimiter, guess.decimal, guess.count)
                 if names is not None and not _are_units(names):
                     return one + 1, names, cells
-        return one + 1, cells, None
+        return one + 1, cells, _labelled_units(lines, above, guess)
     return None
+
+
+def _labelled_units(
+    lines: Sequence[str], above: Sequence[int], guess: _Guess
+) -> tuple[str, ...] | None:
+    """Units of the columns but the first from the preamble of LabVIEW, if it has them."""
+    line = next((lines[one] for one in above if lines[one].startswith("Y_Unit_Label")), None)
+    cells = [] if line is None else split(line, guess.delimiter)
+    return ("", *cells[1 : guess.count]) if len(cells) >= guess.count else None
 
 
 def _are_units(cells: Sequence[str]) -> bool:
@@ -241,7 +250,8 @@ def header_cells(line: str, delimiter: str, decimal: str, count: int) -> tuple[s
     """Cells of a line, or comment, as a header of a number of columns; None if it is not one."""
     bare = line.lstrip(MARKERS) if COMMENT.match(line) else line.lstrip(" ")
     for cells in _splittings(bare, delimiter):
-        if len(cells) == count + 1 and not cells[-1]:
+        # LabVIEW has a column of comments, of which most rows have none.
+        if len(cells) == count + 1 and cells[-1].lower() in {"", "comment"}:
             cells = cells[:-1]
         if len(cells) != count or not any(cells):
             continue

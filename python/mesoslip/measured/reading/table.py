@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip.array_types import Array
+from mesoslip.measured.reading.stamps import Order
 
 
 class BadCell(NamedTuple):
@@ -38,6 +39,8 @@ class Table:
     is_text: bool
     notes: Sequence[str]
     """Lines about the file."""
+    dates: Order | None = None
+    """Order of the dates in its time stamps."""
 
     @property
     def row(self) -> str:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import csv
 import math
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from io import BytesIO
 from itertools import islice
@@ -20,8 +21,16 @@ from numpy.typing import NDArray
 
 from mesoslip.array_types import Array
 from mesoslip.errors import FileError, shown
-from mesoslip.measured.reading.cells import COMMENT, Clock, hint_for, is_missing, is_number, split
+from mesoslip.measured.reading.cells import COMMENT, hint_for, is_missing, is_number, split
 from mesoslip.measured.reading.layout import Layout, check_decimal_comma, find_layout, header_cells
+from mesoslip.measured.reading.stamps import (
+    Chosen,
+    Clock,
+    Order,
+    chosen_order,
+    date_of,
+    order_of,
+)
 from mesoslip.measured.reading.table import BadCell, Table, listed
 
 # Maximum share of rows with fewer cells than others.
@@ -72,14 +81,19 @@ class Lines(Sequence[str]):
 
 
 def read_text(
-    path: Path, text: bytes, *, decimal: str | None = None, has_headers: bool = False
+    path: Path,
+    text: bytes,
+    *,
+    decimal: str | None = None,
+    dates: Order | None = None,
+    has_headers: bool = False,
 ) -> Table:
     """Read a text in UTF-8; see `mesoslip.measured.reading.file.read_file`."""
     lines = Lines(text)
     layout = find_layout(path, lines, decimal, has_headers=has_headers)
     if layout.delimiter != "," and layout.decimal == "," and decimal is None:
         check_decimal_comma(path, lines, layout)
-    body = _Body(path, lines, layout, is_ended=text.endswith(b"\n"))
+    body = _Body(path, lines, layout, dates, is_ended=text.endswith(b"\n"))
     values, numbers = body.read()
     units = list(layout.units or ("",) * layout.count)
     for column in body.clocks:
@@ -93,6 +107,7 @@ def read_text(
         body.bad,
         True,
         [*_layout_notes(layout), *body.notes()],
+        body.order_of_dates,
     )
 
 
@@ -112,6 +127,8 @@ class _Body:
     path: Path
     lines: Lines
     layout: Layout
+    dates: Order | None
+    """The order of dates, if it is given."""
     is_ended: bool
     bad: dict[int, list[BadCell]] = field(default_factory=dict)
     comments: list[int] = field(default_factory=list)
@@ -162,11 +179,31 @@ class _Body:
                 break
             if any(is_number(cell, layout.decimal) for cell in cells):
                 return {
-                    column: Clock()
+                    column: Clock(self._order_of_dates(column) if date_of(cell) else None)
                     for column, cell in enumerate(cells)
                     if Clock().seconds(cell) is not None
                 }
         return {}
+
+    @property
+    def order_of_dates(self) -> Order | None:
+        """The order of the dates, as far as it is known from them or guessed."""
+        known = (one.chosen for one in self.clocks.values() if one.chosen is not None)
+        return next((one.order for one in known if not one.is_open), None)
+
+    def _order_of_dates(self, column: int) -> Chosen:
+        """The order of the dates of a column: as given, by the line of units, or by all dates."""
+        layout = self.layout
+        given = self.dates or (order_of(layout.units[column]) if layout.units else None)
+        if given is not None:
+            return Chosen(given)
+        dates: dict[str, None] = {}
+        for line in islice(self.lines, layout.first, None):
+            with suppress(ValueError, IndexError):
+                date = date_of(split(line, layout.delimiter)[column])
+                if date:
+                    dates[date] = None
+        return chosen_order([*dates])
 
     def _read_block(
         self, block: slice, values: Array, is_row: NDArray[np.bool], signs: NDArray[np.uint16]
@@ -314,7 +351,10 @@ class _Body:
                 return value
             self.bad.setdefault(column, []).append(BadCell(line, cell, ", is too large"))
         elif not is_missing(cell):
-            self.bad.setdefault(column, []).append(BadCell(line, cell, hint_for(cell, decimal)))
+            hint = hint_for(cell, decimal)
+            if clock is not None and clock.chosen is not None and date_of(cell):
+                hint = f", nor a date as {clock.chosen.name} (--dates)"
+            self.bad.setdefault(column, []).append(BadCell(line, cell, hint))
         return math.nan
 
     def _is_header(self, line: str) -> bool:
@@ -375,7 +415,13 @@ class _Body:
             if lines
         ]
         for column, clock in self.clocks.items():
-            notes.append(f"column {column + 1}: time stamps, as seconds from {clock.first}")
+            chosen = clock.chosen
+            guess, order = "", ""
+            if chosen is not None and chosen.is_guess:
+                guess, order = "guess: ", f", dates as {chosen.name} (--dates)"
+            notes.append(
+                f"{guess}column {column + 1}: time stamps, as seconds from {clock.first}{order}"
+            )
         for number in self.texts[:3]:
             notes.append(f"line {number}: text, left out: {shown(self.lines[number - 1].strip())}")
         if len(self.texts) > 3:

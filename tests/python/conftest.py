@@ -152,17 +152,35 @@ def quick_pictures(monkeypatch):
     )
 
 
-@pytest.fixture
-def command(monkeypatch, capfd):
-    """Run a command; returns exit status, standard output and standard error."""
+class Command:
+    """Runs a command of the program in this process."""
 
-    def call(*arguments):
-        monkeypatch.setattr(sys, "argv", ["mesoslip", *map(str, arguments)])
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
+        self._monkeypatch, self._capfd = monkeypatch, capfd
+
+    def __call__(self, *arguments: object) -> tuple[Any, str, str]:
+        """Exit status, standard output and standard error."""
+        self._monkeypatch.setattr(sys, "argv", ["mesoslip", *map(str, arguments)])
         with pytest.raises(SystemExit) as exit_:
             main()
-        captured = capfd.readouterr()
+        captured = self._capfd.readouterr()
         assert "Traceback" not in captured.err
         skip_without_sundials(captured.err)
         return exit_.value.code or 0, captured.out, captured.err
 
-    return call
+    def output(self, *arguments: object) -> str:
+        """Standard output of a command that succeeds."""
+        status, printed, message = self(*arguments)
+        assert status == 0, message
+        return printed
+
+    def refusal(self, *arguments: object) -> str:
+        """Standard error of a command that refuses its arguments or files."""
+        status, _, message = self(*arguments)
+        assert status == 2, message
+        return message
+
+
+@pytest.fixture
+def command(monkeypatch, capfd):
+    return Command(monkeypatch, capfd)

@@ -72,8 +72,7 @@ def test_statistics_are_in_the_units_of_the_table(command):
 
 
 def test_a_configuration_is_no_output(short, command):
-    status, _, printed = command("slips", short)
-    assert status == 2
+    printed = command.refusal("slips", short)
     assert "is a configuration, not an output" in printed
     assert f"mesoslip run {short}" in printed
 
@@ -112,8 +111,7 @@ def test_inputs_and_devices_are_not_overwritten(arguments, short, tmp_path, comm
     os.mkfifo(tmp_path / "fifo")
     before = {path: path.lstat().st_mode for path in tmp_path.rglob("*")}
     held = {path: path.read_bytes() for path in tmp_path.glob("*.[nt]*")}
-    status, _, printed = command(*arguments)
-    assert status == 2
+    printed = command.refusal(*arguments)
     assert printed.startswith("mesoslip: ")
     assert ("ends in one of" in printed) == ("picture" in arguments[-1])
     assert {path: path.lstat().st_mode for path in tmp_path.rglob("*")} == before
@@ -172,8 +170,7 @@ def test_files_of_others_are_not_replaced(arguments, name, target, tmp_path, com
     is_there = target != ".profile"
     if is_there:
         Path(name).write_text("precious")
-    status, _, printed = command(*arguments, name)
-    assert status == 2
+    printed = command.refusal(*arguments, name)
     assert printed.count("\n") == 1
     assert ("is a link to" if target else "is not an output of mesoslip") in printed
     assert (Path(name).read_text() if is_there else "precious") == "precious"
@@ -231,14 +228,12 @@ def test_names_that_are_not_utf_8(short, tmp_path, command):
     # Before the run, whose results could not be written.
     output = Path(strange).with_suffix(".nc")
     reason = "the name of an output must be UTF-8 for netCDF\n"
-    status, _, printed = command("run", strange, "-o", output)
-    assert status == 2
+    printed = command.refusal("run", strange, "-o", output)
     assert printed.endswith(f": {reason}")
     assert printed.count("\n") == 1
     assert not list(tmp_path.glob("*.checkpoint"))
     (tmp_path / "out.nc").rename(output)
-    status, _, printed = command("slips", output)
-    assert status == 2
+    printed = command.refusal("slips", output)
     assert printed.endswith(f": {reason}")
     assert command("slips", strange)[0] == 2
 

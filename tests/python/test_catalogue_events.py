@@ -122,8 +122,7 @@ def test_command_and_messages(trace, command, tmp_path):
 
     path = tmp_path / "a.nc"
     write(trace[0], path)
-    status, out, _ = command("events", path)
-    assert status == 0
+    out = command.output("events", path)
     assert "10 of 20 slips have an event of the channel" in out
     data = json.loads(command("events", path, "--of", "slips", "--json")[1])
     assert len(data["events"]) == 20

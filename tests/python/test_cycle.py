@@ -388,12 +388,10 @@ def test_command(command, tmp_path):
     file = tmp_path / "regular.toml"
     file.write_text(configuration(LONG_STEPS).to_toml())
     output = tmp_path / "cycle.nc"
-    status, printed, _ = command("cycle", file, "-o", output)
-    assert status == 0
+    printed = command.output("cycle", file, "-o", output)
     assert "periodic" in printed
     assert "smooth sliding is linearly unstable" in printed
-    status, printed, _ = command("cycle", file, "--start", output, "--json")
-    summary = json.loads(printed)
+    summary = json.loads(command.output("cycle", file, "--start", output, "--json"))
     assert summary["smooth_stable"] is False
     tree = mesoslip.open_output(output)
     assert summary["period"] == pytest.approx(tree.attrs["period"], rel=2e-5)
@@ -414,8 +412,7 @@ def test_command(command, tmp_path):
 def test_what_has_no_cycle(command, tmp_path, change, words):
     file = tmp_path / "regular.toml"
     file.write_text(configuration().to_toml())
-    status, _, errors = command("cycle", file, "--set", change)
-    assert status == 2
+    errors = command.refusal("cycle", file, "--set", change)
     assert all(word in errors for word in words)
 
 
@@ -434,8 +431,7 @@ def test_what_has_no_cycle(command, tmp_path, change, words):
 def test_what_cannot_be_followed(command, tmp_path, followed, words):
     file = tmp_path / "regular.toml"
     file.write_text(configuration().to_toml())
-    status, _, errors = command("cycle", file, "--continue", followed)
-    assert status == 2
+    errors = command.refusal("cycle", file, "--continue", followed)
     assert all(word in errors for word in words)
 
 

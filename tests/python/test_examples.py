@@ -63,8 +63,7 @@ def test_an_example_is_the_run_of_the_repository(name, tmp_path):
 
 
 def test_every_example_is_listed_with_its_title(command):
-    status, shown, _ = command("example")
-    assert status == 0
+    shown = command.output("example")
     assert "klein" in shown
     assert "Klein 2007: OMCTS between mica" in shown
     assert all(title for title in examples.examples().values())
@@ -73,15 +72,13 @@ def test_every_example_is_listed_with_its_title(command):
 def test_an_example_overwrites_nothing(tmp_path, monkeypatch, command):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "klein.toml").write_text("mine")
-    status, _, errors = command("example", "klein")
-    assert status == 2
+    errors = command.refusal("example", "klein")
     assert "klein.toml: exists already" in errors
     # What it is based on is there, and stays.
     assert command("example", "avalanche")[0] == 0
     assert (tmp_path / "klein.toml").read_text() == "mine"
     assert (tmp_path / "avalanche.toml").exists()
-    status, _, errors = command("example", "kleim")
-    assert status == 2
+    errors = command.refusal("example", "kleim")
     assert "did you mean klein?" in errors
     assert command("example", "klein", "-o", "/dev/null/x.toml")[0] == 2
 
@@ -89,8 +86,7 @@ def test_an_example_overwrites_nothing(tmp_path, monkeypatch, command):
 def test_a_measurement_comes_with_its_data(tmp_path, command):
     written = mesoslip.example("measured/basalt-step", tmp_path / "mine.toml")
     assert [one.name for one in written] == ["mine.toml", "basalt-step.txt.gz"]
-    status, printed, _ = command("trace", written[0], "--dry-run")
-    assert status == 0
+    printed = command.output("trace", written[0], "--dry-run")
     assert "100 Hz from 11674.2 s" in printed
 
 

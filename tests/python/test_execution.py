@@ -334,8 +334,7 @@ def test_a_folder_that_is_no_checkpoint_refuses_the_run(tmp_path, run_file, comm
         assert "mine.checkpoint: was not made by this program" in message
         assert contents(tmp_path) == before
     (tmp_path / "mine.checkpoint").rename(tmp_path / "kept")
-    status, _, _ = command("run", run_file, "-o", tmp_path / "mine.nc")
-    assert status == 0
+    command.output("run", run_file, "-o", tmp_path / "mine.nc")
     after = contents(tmp_path)
     assert after.pop("mine.nc")
     assert after.pop("kept/thesis.tex")
@@ -391,8 +390,7 @@ def test_replacing_another_output_is_reported_before(tmp_path, run_file, command
     # A run that fails leaves the old output, and has said what would have become of it.
     (tmp_path / "out.checkpoint").mkdir()
     (tmp_path / "out.checkpoint" / "theirs").write_text("theirs")
-    status, _, message = command("run", run_file, "-o", output, "--set", "run.seed=5")
-    assert status == 2
+    message = command.refusal("run", run_file, "-o", output, "--set", "run.seed=5")
     assert "the output of another configuration will be replaced" in message
     assert output.read_bytes() == before
 

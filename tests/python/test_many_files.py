@@ -135,18 +135,16 @@ def test_wrong_batches_are_one_message(folder, command):
         ((description,), "needs the files"),
         ((folder / "a.txt", "--dry-run"), "leave out --batch"),
     ):
-        status, _, messages = command(
+        messages = command.refusal(
             "trace", *arguments, "--batch", folder / "t.csv", "-o", folder / "out"
         )
-        assert status == 2
         assert said in messages
         assert not (folder / "t.csv").exists()
     (folder / "there").write_text("")
     for table, outputs in (("t.csv", "there"), ("t.csv", "t.csv")):
-        line = ("trace", folder / "a.txt", "--batch", folder / table, "-o", folder / outputs)
-        status, _, messages = command(*line)
-        assert status == 2
+        messages = command.refusal(
+            "trace", folder / "a.txt", "--batch", folder / table, "-o", folder / outputs
+        )
         assert "is a file; outputs of a batch need the name of a folder" in messages
-    status, _, messages = command("trace", description, folder / "a.txt", "--dry-run")
-    assert status == 2
+    messages = command.refusal("trace", description, folder / "a.txt", "--dry-run")
     assert "--batch" in messages

@@ -244,8 +244,7 @@ def test_the_response_of_a_trace_of_coefficients(tmp_path, command, monkeypatch)
     # Fits take seconds: the commands print those that were made, and one law is drawn.
     monkeypatch.setattr(responses, "response_arrays", lambda *_, **__: arrays)
     monkeypatch.setattr(measured_response, "fit_laws", partial(fit_laws, laws=("slip",)))
-    status, out, _ = command("response", path, "--json")
-    assert status == 0
+    out = command.output("response", path, "--json")
     slip = next(one for one in json.loads(out)["rate_and_state"] if one["law"] == "slip")
     for name in ("a_coefficient", "b_coefficient", "slip_distance"):
         assert slip[name] > 0
@@ -253,8 +252,7 @@ def test_the_response_of_a_trace_of_coefficients(tmp_path, command, monkeypatch)
     assert command("plot", path, "--view", "response", "-o", tmp_path / "a.png")[0] == 0
     assert command("regime", path)[0] == 0
     for option, start in (("--latex", "\\begin{tabular}"), ("--markdown", "| law |")):
-        status, out, _ = command("response", path, option)
-        assert status == 0
+        out = command.output("response", path, option)
         assert out.startswith(start)
     # Differences of AIC from the best law, and bounds of small probabilities.
     (table,) = (one for one in tables(found) if one.title == "Rate and state")

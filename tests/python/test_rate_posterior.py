@@ -238,8 +238,7 @@ def test_the_command_prints_and_writes_a_posterior(command, stored, monkeypatch)
     """Each line of the table has the verdict; the file opens as those of fits do."""
     path, table = stored.with_name("step.rates.nc"), stored.with_suffix(".csv")
     given = ("--samples", "100", "-o", path, "--table", table, "--quiet")
-    status, out, _ = command("response", stored, "--posterior", *given)
-    assert status == 0
+    out = command.output("response", stored, "--posterior", *given)
     lines = [one for one in out.splitlines() if one.lstrip().startswith("slip  ")]
     assert len(lines) == 9
     assert all(one.endswith("described") and "not" not in one for one in lines)
@@ -269,9 +268,7 @@ def test_the_command_prints_and_writes_a_posterior(command, stored, monkeypatch)
 def test_a_posterior_as_json(command, stored):
     path = stored.with_name("json.nc")
     given = ("--samples", "100", "-o", path, "--json", "--law", "slip")
-    status, out, _ = command("response", stored, "--posterior", *given)
-    assert status == 0
-    found = json.loads(out)
+    found = json.loads(command.output("response", stored, "--posterior", *given))
     rows = {one["parameter"]: one for one in found["rate_and_state_posterior"]}
     assert rows["trend"]["unit"] == "m-1"
     assert rows["a"]["percentile_5"] < LAW.a < rows["a"]["percentile_95"]
@@ -302,15 +299,13 @@ def test_an_unknown_stiffness_has_a_prior(record, fit):
     ],
 )
 def test_wrong_options_are_refused(command, stored, given, message):
-    status, _, error = command("response", stored, *given)
-    assert status == 2
+    error = command.refusal("response", stored, *given)
     assert message in error
 
 
 def test_what_has_no_step_has_no_posterior(command, tmp_path):
     path = tmp_path / "still.nc"
     writing.write(trace(stages=[STAGES[0], STAGES[0]]), path)
-    status, _, error = command("response", path, "--posterior", "-o", tmp_path / "a.nc")
-    assert status == 2
+    error = command.refusal("response", path, "--posterior", "-o", tmp_path / "a.nc")
     assert "no step and no hold" in error
     assert not (tmp_path / "a.nc").exists()

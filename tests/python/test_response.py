@@ -391,9 +391,9 @@ def test_the_command(tmp_path, command, monkeypatch):
         monkeypatch.setattr(
             f"mesoslip.{module}.fit_laws", lambda record, *_: fit_laws(record, ("slip",))
         )
-    status, out, _ = command("response", path, "--json", "--csv", table, "--normal-force", "36 uN")
-    assert status == 0
-    answer = json.loads(out)
+    answer = json.loads(
+        command.output("response", path, "--json", "--csv", table, "--normal-force", "36 uN")
+    )
     assert answer["normal_force"] == 36e-6
     steady = answer["steady"][0]
     assert steady["steady_force_coefficient"] == pytest.approx(steady["steady_force"] / 36e-6)
@@ -403,8 +403,7 @@ def test_the_command(tmp_path, command, monkeypatch):
     assert rows[1]["hold_time [s]"]
     assert not rows[1]["steady_force [N]"]
     assert rows[3]["net_change [N]"]
-    status, out, _ = command("response", path, path, "--no-fit")
-    assert status == 0
+    out = command.output("response", path, path, "--no-fit")
     assert out.count("Holds") == 1
     assert "Rate and state" not in out
     figure = mesoslip.plot(path, tmp_path / "a.png", view="response", width="8.6 cm")
@@ -424,12 +423,10 @@ def test_mistakes_are_errors(tmp_path, command):
     assert (status, message.count("\n")) == (2, 1)
     old = ROOT / "tests" / "reference" / "old.nc"
     for force in ("0 N", "-1 N", "3 m", "nan", "much"):
-        status, _, message = command("response", old, "--normal-force", force)
-        assert status == 2
+        message = command.refusal("response", old, "--normal-force", force)
         assert "--normal-force" in message
         assert "Traceback" not in message
-    status, _, message = command("response", old, "--csv", old)
-    assert status == 2
+    message = command.refusal("response", old, "--csv", old)
     pulled = mesoslip.run(
         klein_tables(
             slider={"kind": "quasistatic"},

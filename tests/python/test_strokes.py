@@ -311,9 +311,7 @@ def test_strokes_command(command, tmp_path) -> None:  # type: ignore[no-untyped-
     config = tmp_path / "cycled.toml"
     config.write_text(tomli_w.dumps(tables))
     command("run", config, "-o", output, "--quiet")
-    status, out, _ = command("strokes", output, "--json", "--table", table)
-    assert status == 0
-    found = json.loads(out)
+    found = json.loads(command.output("strokes", output, "--json", "--table", table))
     assert [one["direction"] for one in found["strokes"]] == [-1, 1, -1, 1, -1]
     assert found["strokes"][0]["mean_friction_coefficient"] is None
     assert {"loop_energy", "offset", "stiffness"} <= found["cycles"][0].keys()

@@ -775,8 +775,7 @@ def test_many_points_that_cannot_be_run_are_counted(sweep_file, command):
     path = sweep_file(
         '[sweep]\nmeasures = ["breaks"]\n[sweep.grid]\n"slider.mass" = [-1,-2,-3,-4,-5,-6,-7,8]'
     )
-    status, _, printed = command("sweep", path)
-    assert status == 2
+    printed = command.refusal("sweep", path)
     assert printed.count("must be greater than 0") == 5
     assert "7 of 8 combinations are wrong" in printed
 
@@ -788,8 +787,7 @@ def test_a_sweep_needs_a_sweep(tmp_path, command):
     (tmp_path / "sweep.toml").write_text('base = "base.toml"\n[sweep]')
     status, _, printed = command("run", tmp_path / "sweep.toml")
     assert (status, "the command for it is mesoslip sweep" in printed) == (2, True)
-    status, _, printed = command("sweep", tmp_path / "sweep.toml", "--pool", "swimming")
-    assert status == 2
+    printed = command.refusal("sweep", tmp_path / "sweep.toml", "--pool", "swimming")
     with pytest.raises(ConfigError, match="executor"):
         mesoslip.sweep(tables(), executor="swimming")
 
@@ -801,8 +799,7 @@ def test_changes_of_what_the_sweep_sets_are_refused(tmp_path, sweep_file, comman
         ("contacts.delay", "the table [sweep]"),
         ("run.realizations", "sweep.realizations"),
     ):
-        status, _, err = command(*arguments, "--set", f"{key}=3")
-        assert status == 2
+        err = command.refusal(*arguments, "--set", f"{key}=3")
         assert f"{key}: cannot be changed, as {setter} sets it; change that" in err
     assert command(*arguments, "--set", "sweep.realizations=3")[0] == 0
 
@@ -818,8 +815,7 @@ def test_many_combinations_are_checked_with_progress_or_refused(
     assert status == 0
     assert "checking: 50 % after 0 s" in err
     monkeypatch.setattr("mesoslip.campaign.sweep_plan.free_memory", lambda: 1e3)
-    status, _, err = command(*arguments)
-    assert status == 2
+    err = command.refusal(*arguments)
     assert re.search(r"sweep: has \d+ combinations, which take about .* GiB of memory", err)
 
 
@@ -841,8 +837,7 @@ def test_a_checked_combination_takes_little_memory():
 
 def test_a_dry_run_runs_nothing(tmp_path, sweep_file, command):
     output = tmp_path / "out" / "sweep.nc"
-    status, printed, _ = command("sweep", sweep_file(SIMPLE), "-o", output, "--dry-run")
-    assert status == 0
+    printed = command.output("sweep", sweep_file(SIMPLE), "-o", output, "--dry-run")
     assert "points   4 (2 contacts.delay x 2 realizations), 0 of them done" in printed
     assert {line.split()[0] for line in printed.splitlines()} == {
         "points",

@@ -205,12 +205,10 @@ def test_a_folder_that_is_none_is_reported(tmp_path, sweep_file, command):
     output = tmp_path / "sweep.nc"
     earlier = earlier_output(output)
     output.with_name("sweep.points").write_text("a file")
-    status, _, printed = command("sweep", sweep_file(SIMPLE), "-o", output)
-    assert status == 2
+    printed = command.refusal("sweep", sweep_file(SIMPLE), "-o", output)
     assert "sweep.points: was not made by this program" in printed
     assert output.read_bytes() == earlier
-    status, _, printed = command("sweep", sweep_file(SIMPLE), "-o", output / "in" / "sweep.nc")
-    assert status == 2
+    printed = command.refusal("sweep", sweep_file(SIMPLE), "-o", output / "in" / "sweep.nc")
     assert "cannot be written: Not a directory" in printed
 
 

@@ -160,8 +160,7 @@ def test_a_table_becomes_an_output(tmp_path, command):
     np.testing.assert_allclose(
         mesoslip.slips(tree)["peak_velocity"], mesoslip.slips(run)["peak_velocity"], rtol=0.15
     )
-    status, shown, _ = command("slips", output, "--json")
-    assert status == 0
+    shown = command.output("slips", output, "--json")
     assert json.loads(shown)["slips"][0]["contacts_broken"] is None
     assert command("slips", output)[0] == 0
     assert command("plot", output, "-o", tmp_path / "trace.png")[0] == 0
@@ -230,8 +229,7 @@ def test_analyses_of_a_trace_with_and_without_configuration(tmp_path, command):
     bare = tmp_path / "bare.nc"
     assert command("trace", table, "-o", bare)[0] == 0
     assert mesoslip.regime(bare)["regime"].item() == exact["regime"].item()
-    status, _, message = command("response", bare)
-    assert status == 2
+    message = command.refusal("response", bare)
     assert re.search(r"\bbare\.nc: neither the load point nor its velocity is known", message)
 
 
@@ -282,8 +280,7 @@ def test_rates_and_columns(tmp_path):
 )
 def test_what_is_wrong_is_reported_with_the_line(tmp_path, command, text, options, said):
     table = write(tmp_path / "trace.csv", text)
-    status, _, printed = command("trace", table, "-o", tmp_path / "out.nc", *options)
-    assert status == 2
+    printed = command.refusal("trace", table, "-o", tmp_path / "out.nc", *options)
     assert said in printed
     assert not (tmp_path / "out.nc").exists()
 
@@ -346,8 +343,7 @@ AMBIGUOUS = [
 def test_numbers_are_read_in_one_way(tmp_path, command, delimiter, row, wanted):
     table = tmp_path / "table.csv"
     table.write_text(f"time [ms]{delimiter}force [uN]\n0{delimiter}1\n{row}\n", encoding="utf-8")
-    status, _, errors = command("trace", table, "-o", tmp_path / "out.nc")
-    assert status == 2
+    errors = command.refusal("trace", table, "-o", tmp_path / "out.nc")
     assert wanted in errors
     assert len(errors) < 600
 

@@ -357,10 +357,11 @@ def trace_of(understood: Understood) -> DataTree:
 
 def _are_of_track(record: Record, found: FoundSlips) -> bool:
     """Whether the falls of a record are those of the track of a disc."""
-    known = record.rotation_speed if record.revolutions is None else record.revolutions
+    revolutions, speed = (record.signals.get(name) for name in ("revolutions", "rotation_speed"))
+    known = speed if revolutions is None else revolutions
     if known is None or not np.isfinite(known).any():
         return False
-    angle = angle_of(record.time, record.revolutions, record.rotation_speed)
+    angle = angle_of(record.time, revolutions, speed)
     return are_of_track(found, record.time, angle)
 
 

@@ -32,9 +32,10 @@ module mesoslip_recording_ruptures
       logical :: is_open = .false.
       !> When it began, when the block was fast last, and when it ruptured, or never [s]
       real(wp) :: start_time = 0.0_wp, last_time = 0.0_wp, rupture_time = never
-      !> When it was slow last with most contacts pinned [s]
-      real(wp) :: pinned_time = 0.0_wp
-      !> Force [N], displacement [m] and breaks then, and breaks at which the block ruptures
+      !> End of the first step after which most contacts were not pinned, never if they are [s]
+      real(wp) :: detached_time = 0.0_wp
+      !> Force [N], displacement [m] and breaks when the block was slow last with most contacts
+      !> pinned, and breaks at which it ruptures
       real(wp) :: start_force = 0.0_wp, start_place = 0.0_wp, start_breaks = 0.0_wp, limit = never
       !> Force [N] and displacement [m] when it was fast last, and maximum of its velocity [m/s]
       real(wp) :: last_force = 0.0_wp, last_place = 0.0_wp, peak_velocity = 0.0_wp
@@ -122,12 +123,14 @@ contains
          end if
          if (slip%is_open) return
          if (pinned_part >= broken_part) then
-            slip = block_slip_type(pinned_time=time, start_force=force, start_place=place, &
+            slip = block_slip_type(detached_time=never, start_force=force, start_place=place, &
                & start_breaks=breaks, limit=breaks + max(1.0_wp, broken_part * pinned))
-         else if (time > slip%pinned_time + self%quiet_time) then
-            ! It slides without a slip.
-            slip = block_slip_type()
+            return
          end if
+         ! A row at rest may have been pinned all along a step that its break ends.
+         slip%detached_time = min(slip%detached_time, time)
+         ! It slides without a slip.
+         if (time > slip%detached_time + self%quiet_time) slip = block_slip_type()
       end associate
    end subroutine note_motion
 
@@ -176,7 +179,7 @@ contains
             call archive%exchange("start_time", slip%start_time)
             call archive%exchange("last_time", slip%last_time)
             call archive%exchange("rupture_time", slip%rupture_time)
-            call archive%exchange("pinned_time", slip%pinned_time)
+            call archive%exchange("detached_time", slip%detached_time)
             call archive%exchange("start_force", slip%start_force)
             call archive%exchange("start_place", slip%start_place)
             call archive%exchange("start_breaks", slip%start_breaks)

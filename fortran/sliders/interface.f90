@@ -212,6 +212,7 @@ contains
       call archive%exchange("base_time", self%base_time)
       call archive%exchange("is_quiet", self%is_quiet)
       call archive%exchange_fixed("place", [self%blocks, 1], self%place)
+      call archive%exchange_fixed("place_remainder", [self%blocks, 1], self%place_remainder)
       call archive%exchange_fixed("speed", [self%blocks, 1], self%speed)
       call archive%exchange_fixed("bend", [self%blocks, 1], self%bend)
       call archive%exchange_fixed("damper", [self%blocks, 1], self%damper)

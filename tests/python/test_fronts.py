@@ -12,7 +12,14 @@ import pytest
 from conftest import ROOT
 from kinds import configuration
 from mesoslip import Config, ConfigError, FileError
-from mesoslip.analysis.fronts import EVENTS, FRONT_TYPES, first_front, fronts_of, static_balance
+from mesoslip.analysis.fronts import (
+    EVENTS,
+    FRONT_TYPES,
+    first_front,
+    fronts_of,
+    residual_of,
+    static_balance,
+)
 from mesoslip.campaign.measures import MEASURES, RunView
 from mesoslip.command_line.main import app
 from mesoslip.plots.draw import movie_of
@@ -310,19 +317,34 @@ def test_the_command_prints_all_tables(tree, tmp_path, capsys):
 
 
 @pytest.mark.long
-def test_means_over_seeds_are_those_of_the_page():
-    """Force of the first precursor and of the first whole event, and precursors before that."""
+def test_precursors_of_20_seeds_grow_along_the_static_balance():
+    """Their number, lengths and forces, and those of the first whole event, are those of the page:
+    inertia carries precursors beyond the balance."""
     run = Config.load(ROOT / "runs" / "precursors.toml")
-    changes = {"run.realizations": 8, "run.drive_displacement": 5.5e-4, "contacts.count": 640}
-    events = mesoslip.fronts(mesoslip.run(run.replace(changes)))["events"].to_dataset()
+    changes = {"run.realizations": 20, "run.drive_displacement": 5.5e-4, "contacts.count": 640}
+    tree = mesoslip.run(run.replace(changes))
+    balance = static_balance(run, residual_of(tree))
+    assert balance is not None
+    top = int(balance.argmax())
     measured = []
-    for _, own in events.groupby("realization_index"):
-        force, whole = own["spring_force"].values, int(np.argmax(own["kind"].values))
-        assert own["kind"].values[whole] == 1, "no whole event"
-        measured.append((force[0], force[whole], whole))
-    means, errors = np.mean(measured, axis=0), np.std(measured, axis=0, ddof=1) / np.sqrt(8)
-    # Motion is chaotic: other digits are other seeds.
-    assert np.all(np.abs(means - [3.24, 13.7, 18.1]) < 4 * errors), (means, errors)
+    for _, own in mesoslip.fronts(tree)["events"].to_dataset().groupby("realization_index"):
+        force, blocks, kind = (own[name].values for name in ("spring_force", "block_count", "kind"))
+        whole = int(np.argmax(kind))
+        assert kind[whole] == 1, "no whole event"
+        longest = np.maximum.accumulate(np.append(2, blocks[:whole]))
+        longer = np.flatnonzero(blocks[:whole] > longest[:-1])
+        steps = np.arange(top + 1)
+        beyond = blocks[longer] - np.interp(force[longer], balance[: top + 1], steps)
+        measured.append((force[0], force[whole], whole, longer.size, beyond.mean()))
+    means, spreads = np.mean(measured, axis=0), np.std(measured, axis=0, ddof=1)
+    # Motion is chaotic: other digits are other seeds, and a spread has an error of a sixth.
+    expected = np.array([3.24, 13.68, 18.4, 4.8, 2.8]), np.array([0.049, 0.52, 4.2, 1.0, 0.78])
+    assert np.all(np.abs(means - expected[0]) < 4 * spreads / np.sqrt(20)), means
+    assert np.all(np.abs(np.log(spreads / expected[1])) < 4 / 6), spreads
+    assert 0 < means[1] - balance[top] < 2 * spreads[1]
+    # Behind them the stress is lower than where they start.
+    ruptures = tree["ruptures"]
+    assert float(ruptures["force_after"].mean()) < 0.8 * float(ruptures["force_before"].mean())
 
 
 def test_other_outputs_have_no_fronts():

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import at_end, long
+from conftest import ROOT, at_end, long
 from mesoslip import Config, Realization
 from numpy.typing import NDArray
 from plain_interface import PlainInterface
@@ -235,6 +235,31 @@ def test_a_rupture_is_the_break_of_half_of_the_pinned_contacts():
     assert rupture["start_time"] <= rupture["rupture_time"] <= rupture["end_time"]
 
 
+def test_a_row_at_rest_ruptures_and_balances_the_energy_of_many_equal_steps():
+    """A block breaks after a step of 1000 s. Then the row rings in steps of 1 us at a time of which
+    that is not a multiple, and moves by ever smaller parts of its displacement."""
+    changes = {
+        "run.drive_displacement": 2.025e-5,
+        "slider.blocks": 10,
+        "slider.mass": 0.01,
+        "slider.length": 0.1,
+        "slider.bar_stiffness": 1e6,
+        "slider.stiffness": 4.99e4,
+        "slider.top_stiffness": 1e3,
+        "slider.damping": 3e3,
+        "contacts.count": 10,
+        "contacts.static_force": 10.0,
+        "contacts.stiffness": 1e10,
+        "contacts.drag": 1e4,
+    }
+    config = Config.load(ROOT / "runs" / "front-types.toml").replace(changes)
+    one = Realization(config)
+    while not one.finished:
+        one.advance()
+    assert one.breaks == one.table("ruptures").sizes["rupture"] == 1
+    assert abs(one.energy_residual) < 1e-15
+
+
 def test_a_block_that_slides_without_a_slip_does_not_rupture():
     """Most of its contacts break one by one, long before its only slip."""
     tables = row(1, 6.0, bar_stiffness=None, damping=40.0, **TOP | {"top_stiffness": 1000.0})
@@ -296,3 +321,21 @@ def test_alike_contacts_under_springs_from_above_are_a_rigid_slider():
     # Each block has steps of its own, to the accuracy of the master equation.
     assert theirs.max() > 100
     np.testing.assert_allclose(mine, theirs, atol=5e-4 * theirs.max())
+
+
+@pytest.mark.parametrize("damping", [0.42, 0.44667, 0.46])
+def test_populations_of_a_block_are_those_of_a_rigid_slider(damping):
+    """Also where it turns round: contacts that attached before are stretched against the motion
+    before the turn."""
+    tables = row(1, 6.0, bar_stiffness=None, damping=damping, **TOP | {"top_stiffness": 20.0})
+    tables["run"] |= {"engine": "me", "resolution": 0.0625}
+    tables["contacts"] |= {"stiffness": 150.0, "static_force": 150.0, "drag": 6.0}
+    tables["contacts"] |= {
+        "renewal": "redraw",
+        "threshold": {"law": "gaussian", "relative_width": 0.2},
+    }
+    block = finished(tables)
+    tables["slider"] = {"kind": "rigid", "mass": BLOCK_MASS, "stiffness": 20.0, "damping": damping}
+    rigid = finished(tables)
+    mine, theirs = (one.records("trace")["contact_force"] for one in (block, rigid))
+    np.testing.assert_allclose(mine, theirs, atol=3e-4 * theirs.max())

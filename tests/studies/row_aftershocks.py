@@ -3,7 +3,7 @@
 Contacts without and with ageing and temperature (Braun and Tosatti, Phys. Rev. E 90, 032403
 (2014), found aftershocks with ageing and an elastic slider); numbers for docs/interface.md.
 
-    python tests/studies/row_aftershocks.py [REALIZATIONS]
+    python tests/studies/row_aftershocks.py [REALIZATIONS [VELOCITY [DISPLACEMENT]]]
 """
 
 from __future__ import annotations
@@ -19,7 +19,6 @@ WHOLE = 1
 
 BASE = {
     "contacts.count": 640,
-    "run.drive_displacement": "3 mm",
     "slider.loading": "both",
     "slider.top_stiffness": "60 kN/m",
     "output.interval": "5 ms",
@@ -57,11 +56,15 @@ def sequences(events: xr.Dataset, duration: float) -> tuple[np.ndarray, np.ndarr
 
 
 def main() -> None:
-    realizations = sys.argv[1] if len(sys.argv) > 1 else "10"
+    realizations, velocity, displacement = (
+        *sys.argv[1:],
+        *("10", "1 mm/s", "3 mm")[len(sys.argv) - 1 :],
+    )
+    drive = {"drive.velocity": velocity, "run.drive_displacement": displacement}
     for name, changes in KINDS.items():
         config = mesoslip.Config.load(
             "runs/precursors.toml",
-            [f"{key}={value}" for key, value in (BASE | changes).items()],
+            [f"{key}={value}" for key, value in (BASE | drive | changes).items()],
         ).replace({"run.realizations": int(realizations)})
         events = mesoslip.fronts(mesoslip.run(config))["events"].to_dataset()
         times, kinds, end = sequences(events, config.expected_duration)
@@ -76,7 +79,7 @@ def main() -> None:
         if others.size:
             deciles = 1e3 * np.quantile(since, [0.1, 0.25, 0.5, 0.75, 0.9])
             print("  after the last whole one [ms; 10, 25, 50, 75, 90 %]:", deciles.round(2))
-            print(" ", omori(times, kinds.astype(float), WHOLE, end))
+            print(" ", omori(times, kinds.astype(float), WHOLE, end), flush=True)
 
 
 if __name__ == "__main__":

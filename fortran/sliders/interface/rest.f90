@@ -79,6 +79,7 @@ contains
       end do
       self%rests = .true.
       self%place = place
+      self%place_remainder = 0.0_wp
       self%speed = speed
       self%bend = 0.0_wp
       self%damper = 0.0_wp

@@ -18,7 +18,7 @@ module mesoslip_sliders_interface_row
       & max_order, moments
    use mesoslip_sliders_interface_rest, only: try_rest
    use mesoslip_sliders_interface_series, only: drive_at, expand, expand_all, fastest_rate, &
-      & expand_published, shorten_step
+      & expand_published, shorten_step, whole_length
    use mesoslip_sliders_interface_state, only: busy_pace, excess_type, load_motion, &
       & min_order, min_pace, motion_of_damper, quiet_pace, row_state_type
    use mesoslip_sliders_motion_series, only: first_end, inverse
@@ -81,7 +81,7 @@ contains
       if (self%is_quiet) call try_rest(self)
       if (.not. self%rests) then
          if (self%length * self%rate > self%pace) then
-            self%length = self%pace / self%rate
+            self%length = whole_length(self, self%pace / self%rate)
             self%reaches_end = .false.
          end if
          self%order = max_order
@@ -98,7 +98,7 @@ contains
       self%ends_at_event = self%queue%first_time() < self%length &
          & .and. (self%rests .or. self%pace > 2.0_wp * busy_pace)
       if (self%ends_at_event) then
-         self%length = self%queue%first_time()
+         self%length = whole_length(self, self%queue%first_time())
          self%reaches_end = .false.
       end if
    end subroutine begin_step
@@ -229,6 +229,9 @@ contains
       !> Whether its contacts have to respond
       logical, intent(out) :: asks
 
+      real(wp) :: start
+
+      start = self%place(block)
       call carry(self, block, self%span(block))
       asks = .true.
       select case (self%block(block)%kind)
@@ -241,7 +244,10 @@ contains
       case (event_time, event_clock)
          call receive(self, block, .false.)
       case (event_turn)
+         ! Its last velocity is that before the turn, not the rounding of zero.
          self%speed(block) = 0.0_wp
+         if (abs(self%place(block) - start) > 0.0_wp) self%sense(block) = sign(1.0_wp, &
+            & self%place(block) - start)
       case (event_again, event_publish)
          asks = .false.
       case default
@@ -303,8 +309,10 @@ contains
          self%damper(block) = once
       end if
       start = self%place(block)
-      call evaluate_all(series, order, step, self%place(block), self%speed(block), &
-         & self%bend(block), self%jerk(block), self%snap(block))
+      series(0) = self%place_remainder(block)
+      call evaluate_all(series, order, step, once, self%speed(block), self%bend(block), &
+         & self%jerk(block), self%snap(block))
+      call add_exactly(self%place(block), self%place_remainder(block), once)
       if (abs(self%speed(block)) > 0.0_wp) self%sense(block) = sign(1.0_wp, self%speed(block))
       self%moment(block) = self%moment(block) + step
       if (self%has_clocks) then
@@ -317,12 +325,27 @@ contains
       end if
    end subroutine carry
 
+   !> Move a block, and keep what its displacement does not hold.
+   elemental subroutine add_exactly(place, remainder, displacement)
+      !> Displacement [m], and its part below rounding
+      real(wp), intent(inout) :: place
+      real(wp), intent(out) :: remainder
+      !> Increase, with the remainder before [m]
+      real(wp), intent(in) :: displacement
+
+      real(wp) :: before
+
+      before = place
+      place = before + displacement
+      remainder = displacement - (place - before)
+   end subroutine add_exactly
+
    !> Move all blocks that go on as published to the end of the step, with their books.
    subroutine carry_published(self)
       class(row_state_type), intent(inout) :: self
 
       real(wp), dimension(self%blocks) :: share, once, twice, part, jerk, snap
-      integer :: term
+      integer :: block, term
 
       ! 1 for a block that goes on as published.
       share = merge(0.0_wp, 1.0_wp, self%block%is_own)
@@ -347,10 +370,14 @@ contains
             jerk = jerk * step + part
             part = part * step + twice
             twice = twice * step + once
-            once = once * step + series(:, term)
+            if (term > 0) once = once * step + series(:, term)
+         end do
+         once = once * step + self%place_remainder
+         do block = 1, self%blocks
+            if (.not. self%block(block)%is_own) call add_exactly(self%place(block), &
+               & self%place_remainder(block), once(block))
          end do
          where (.not. self%block%is_own)
-            self%place = once
             self%speed = twice
             self%bend = part
             self%jerk = 6.0_wp * jerk

@@ -8,6 +8,7 @@ module mesoslip_sliders_interface_series
    private
 
    public :: drive_at, expand, expand_all, expand_published, fastest_rate, shorten_step
+   public :: whole_length
 
 contains
 
@@ -32,6 +33,18 @@ contains
          & + 2.0_wp * self%max_neighbours * self%viscosity
    end function rate_of
 
+   !> The shortest length of the step, from one on, whose end is a number. Otherwise the drive would
+   !> continue from a rounded time, and equal steps add work that no term of the energy has.
+   pure function whole_length(self, length) result(whole)
+      class(row_state_type), intent(in) :: self
+      !> Length [s]
+      real(wp), intent(in) :: length
+      real(wp) :: whole
+
+      whole = (self%time + length) - self%time
+      if (whole < length) whole = nearest(self%time + length, 1.0_wp) - self%time
+   end function whole_length
+
    !> End the step earlier if the contacts of a block have become so stiff or dragging that motions
    !> would not be exact up to its end, as where all of a block detach and their drag is large.
    subroutine shorten_step(self, block)
@@ -46,7 +59,7 @@ contains
       end associate
       if (rate <= self%rate) return
       self%rate = rate
-      length = self%moment(block) + self%reach(self%order) / rate
+      length = whole_length(self, self%moment(block) + self%reach(self%order) / rate)
       if (length >= self%length) return
       self%length = length
       self%reaches_end = .false.

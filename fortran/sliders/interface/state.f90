@@ -69,6 +69,8 @@ module mesoslip_sliders_interface_state
       !> Displacement [m], velocity [m/s], half the acceleration [m/s2], and deceleration by the
       !> damper [m/s2] of each block, at its own time after the start of the step [s]
       real(wp), allocatable :: place(:), speed(:), bend(:), damper(:), moment(:)
+      !> Part of the displacement below its rounding [m]: of steps alike, each is rounded alike
+      real(wp), allocatable :: place_remainder(:)
       !> Sign of the last velocity that was not zero
       real(wp), allocatable :: sense(:)
       !> Time at which the law of its contacts was offered, after the start of the step [s], and
@@ -152,6 +154,7 @@ contains
 
       associate (n => self%blocks)
          call reserve(self%place, n, 0.0_wp, error)
+         call reserve(self%place_remainder, n, 0.0_wp, error)
          call reserve(self%speed, n, 0.0_wp, error)
          call reserve(self%bend, n, 0.0_wp, error)
          call reserve(self%damper, n, 0.0_wp, error)

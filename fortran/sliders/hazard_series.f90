@@ -102,10 +102,19 @@ contains
       real(wp), intent(inout) :: step
       integer, intent(out) :: ended_by
 
-      real(wp) :: time, part, mean(0:short_order, clocks)
+      real(wp) :: time, part, mean(0:short_order, clocks), even, odd
       integer :: number
 
       ended_by = 0
+      if (.not. any(clock%is_used .and. clock%left <= max_growth * (clock%rate * step))) then
+         ! Most steps end before any reading.
+         call grow_short(exponent, even, odd)
+         do number = 1, clocks
+            if (clock(number)%is_used) clock(number)%elapsed = clock(number)%rate * step &
+               & * (even + sign(1.0_wp, clock(number)%slope * clock(1)%slope) * odd)
+         end do
+         return
+      end if
       time = 1.0_wp
       do number = 1, clocks
          if (.not. clock(number)%is_used) cycle
@@ -293,6 +302,31 @@ contains
             & + (a_3 * e(3) + (a_2 * p_4 + (a * p_5 + p_6))))
       end associate
    end function short_means
+
+   !> Mean of the exponential function over a short step: the sum of these coefficients, in two
+   !> parts, of which the second changes its sign with the exponent.
+   pure subroutine grow_short(e, even, odd)
+      !> The exponent, over a step of length 1
+      real(wp), intent(in) :: e(short_terms)
+      real(wp), intent(out) :: even, odd
+
+      real(wp) :: a_2, a_3, b_2
+
+      associate (a => e(1), b => e(2), c => e(3), d => e(4))
+         a_2 = 0.5_wp * a**2
+         a_3 = inverse(3) * a * a_2
+         b_2 = 0.5_wp * b**2
+         even = 1.0_wp + (inverse(3) * a_2 + (inverse(4) * a * b &
+            & + (inverse(5) * (inverse(6) * a_2**2 + (a * c + b_2)) &
+            & + (inverse(6) * (a_3 * b + (a * d + b * c)) &
+            & + inverse(7) * (0.05_wp * a_3**2 + (a_3 * c + a_2 * b_2) &
+            & + (b * d + 0.5_wp * c**2))))))
+         odd = inverse(2) * a + (inverse(3) * b + (inverse(4) * (a_3 + c) &
+            & + (inverse(5) * (a_2 * b + d) &
+            & + (inverse(6) * (0.1_wp * a_2 * a_3 + (a_2 * c + a * b_2)) &
+            & + inverse(7) * (inverse(6) * a_2**2 * b + (a_2 * d + a * b * c))))))
+      end associate
+   end subroutine grow_short
 
    !> The same of a middling step that changes the exponent little: of g = exp(e), n g_n is the sum
    !> over j of j e_j g_(n-j). The last factors come last, as the others do not wait for them.

@@ -17,10 +17,12 @@ module mesoslip_schedule
    implicit none
    private
 
-   public :: schedule_type, max_events
+   public :: schedule_type, max_events, max_turns
 
    !> Maximum number of breaks, and of attachments, in a schedule
    integer, parameter :: max_events = 64
+   !> Maximum number of contacts whose forces change their sign in a step without ending it
+   integer, parameter :: max_turns = 8
 
    !> Coming and past events.
    type :: schedule_type
@@ -92,8 +94,9 @@ module mesoslip_schedule
       logical :: break_gone(max_events) = .false., clock_gone(max_events) = .false.
       !> For each entry by coordinate whether the contact does not break there, but its force gets
       !> the sign of the motion; its stretch at breaking [m], its remaining deviate, and its reading
-      !> [s], by the other clock before that and by this one after it
-      logical :: break_turns(max_events) = .false.
+      !> [s], by the other clock before that and by this one after it. Whether its hazard is
+      !> negligible where that happens, so that the step needs not end there
+      logical :: break_turns(max_events) = .false., turns_later(max_events) = .false.
       real(wp) :: turn_limit(max_events) = 0.0_wp, turn_left(max_events) = 0.0_wp, &
          & turn_key(max_events) = 0.0_wp
       !> Past changes of sign; contacts of the other clock, and the entry of the first of them to
@@ -116,8 +119,10 @@ module mesoslip_schedule
       procedure, non_overridable :: pass
       procedure, non_overridable, private :: break_due, attach_due, fit_to_track, &
          & insert_attachment
+      !> Whether the end of the next step is known
+      procedure, non_overridable :: knows_stop
       procedure, non_overridable, private :: pass_clocks, break_with_clocks, attach_with_clocks, &
-         & change_sign, cut_lists, skip_gone
+         & change_sign, cut_lists, skip_gone, find_stop
    end type schedule_type
 
 contains
@@ -133,23 +138,69 @@ contains
    end function law
 
    !> Window until the next event, before the end of the schedule.
-   pure function window(self, time)
+   pure function window(self, time, velocity)
       class(schedule_type), intent(in) :: self
-      !> Time now [s]
-      real(wp), intent(in) :: time
+      !> Time now [s], and velocity [m/s]
+      real(wp), intent(in) :: time, velocity
       type(window_type) :: window
 
+      real(wp) :: stop
+
+      stop = self%break_coordinate(self%broken + 1)
+      window%end_time = min(self%attach_time(self%attached + 1), self%end_time, &
+         & time + self%max_step)
+      if (self%has_clocks) then
+         if (self%turns_later(self%broken + 1)) then
+            if (self%hazard%lets_turn_later(velocity)) then
+               call self%find_stop(stop)
+               window%end_time = min(window%end_time, time + self%hazard%turn_duration)
+            end if
+         end if
+      end if
       if (self%direction > 0.0_wp) then
-         window%upper = self%break_coordinate(self%broken + 1)
+         window%upper = stop
          window%lower = self%behind
       else
          window%upper = -self%behind
-         window%lower = -self%break_coordinate(self%broken + 1)
+         window%lower = -stop
       end if
-      window%end_time = min(self%attach_time(self%attached + 1), self%end_time, &
-         & time + self%max_step)
       if (self%has_clocks) call self%hazard%limit_window(window)
    end function window
+
+   !> Coordinate up to which forces change their sign without a step of their own; huge if it is not
+   !> known.
+   pure subroutine find_stop(self, stop)
+      class(schedule_type), intent(in) :: self
+      !> The coordinate [m]
+      real(wp), intent(out) :: stop
+
+      integer :: event, turns
+
+      turns = 0
+      stop = huge(1.0_wp)
+      do event = self%broken + 1, self%breaks
+         if (self%break_gone(event)) cycle
+         stop = min(self%break_coordinate(event), &
+            & self%break_coordinate(self%broken + 1) + self%hazard%turn_distance)
+         if (stop < self%break_coordinate(event) .or. turns == max_turns &
+            & .or. .not. self%turns_later(event)) return
+         turns = turns + 1
+      end do
+      stop = huge(1.0_wp)
+   end subroutine find_stop
+
+   !> Whether it is known where the next step ends at the latest.
+   pure function knows_stop(self)
+      class(schedule_type), intent(in) :: self
+      logical :: knows_stop
+
+      real(wp) :: stop
+
+      knows_stop = .true.
+      if (.not. self%turns_later(self%broken + 1)) return
+      call self%find_stop(stop)
+      knows_stop = stop < huge(1.0_wp)
+   end function knows_stop
 
    !> Number of contacts that broke.
    pure function break_count(self) result(number)
@@ -366,11 +417,15 @@ contains
          & .or. self%broken == self%breaks .or. self%clock_broken == self%clock_breaks &
          & .or. self%pinned == self%others
       if (self%is_over) return
+      self%is_over = .not. self%knows_stop()
+      if (self%is_over) return
       if (self%attach_time(self%attached + 1) <= time) then
          if (allocated(self%strength)) call self%fit_to_track(time, displacement)
          call self%attach_with_clocks(time, displacement)
          self%is_over = self%broken == self%breaks .or. self%clock_broken == self%clock_breaks &
             & .or. self%attach_time(self%attached + 1) <= time
+         if (self%is_over) return
+         self%is_over = .not. self%knows_stop()
          if (self%is_over) return
       end if
       self%hazard%next(self%number) = self%clock_key(self%clock_broken + 1)

@@ -17,8 +17,8 @@ module mesoslip_contacts_individual_scan_order
    real(wp), parameter :: max_key = 1.0e290_wp
    !> Key of a contact that is not in the order
    real(wp), parameter :: none = huge(1.0_wp)
-   !> Contacts wanted of the first scan; doubled in each scan up to this part of all contacts, 1/8
-   integer, parameter :: min_scan = 64, part = 8
+   !> Contacts wanted of the first scan; doubled in each scan up to this part of all contacts, 1/4
+   integer, parameter :: min_scan = 64, part = 4
    !> Room for late contacts before the sorted ones, and the maximum number of sorted ones that
    !> move to make room again
    integer, parameter :: slack = 64, max_moved = 4096
@@ -28,6 +28,8 @@ module mesoslip_contacts_individual_scan_order
    integer, parameter :: max_bins = 4096, bin_load = 4, max_load = 64
    !> Keys that are sampled to estimate a horizon
    integer, parameter :: samples = 64
+   !> Contacts wanted over those found from which that is done again
+   integer, parameter :: max_lack = 4
    !> Maximum factor by which the distance to the next horizon changes
    real(wp), parameter :: max_factor = 4.0_wp
 
@@ -281,7 +283,8 @@ contains
       self%last = last
       call sort_evenly(self%near_key(slack + 1:last), self%near_contact(slack + 1:last), start, &
          & horizon)
-      if (last == slack) self%reach = 0.0_wp
+      ! Keys that grow exponentially are estimated again: a factor would follow them too slowly.
+      if (last - slack < self%wanted / max_lack) self%reach = 0.0_wp
       if (self%reach < none / max_factor &
          & .and. (last - slack < self%wanted / 2 .or. last - slack > 2 * self%wanted)) then
          self%reach = self%reach * min(max_factor, max(1.0_wp / max_factor, &

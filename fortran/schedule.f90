@@ -66,6 +66,15 @@ module mesoslip_schedule
          & attach_drag(max_events) = 0.0_wp
       !> Displacements of past attachments [m]
       real(wp) :: attach_displacement(max_events) = 0.0_wp
+      !> Listed sites that touch or separate as the normal load changes, and those that have. For
+      !> each its time [s], followed by that of the first one beyond the list; whether it touches;
+      !> stiffness [N/m], origin if it separates [m], and stretch at breaking if it touches [m];
+      !> displacement [m] of past ones
+      integer :: sites = 0, sited = 0
+      real(wp) :: site_time(max_events + 1) = huge(1.0_wp)
+      logical :: site_touches(max_events) = .false.
+      real(wp) :: site_stiffness(max_events) = 0.0_wp, site_origin(max_events) = 0.0_wp, &
+         & site_limit(max_events) = 0.0_wp, site_displacement(max_events) = 0.0_wp
       !> Strength along the track, which multiplies breaking stretches where contacts attach; not
       !> allocated where there is none
       class(track_strength_type), allocatable :: strength
@@ -117,8 +126,8 @@ module mesoslip_schedule
       procedure, non_overridable :: break_count
       !> Make the events that are due at a time and a displacement
       procedure, non_overridable :: pass
-      procedure, non_overridable, private :: break_due, attach_due, fit_to_track, &
-         & insert_attachment
+      procedure, non_overridable, private :: break_due, attach_due, follow_load, fit_to_track, &
+         & insert_attachment, cut_breaks
       !> Whether the end of the next step is known
       procedure, non_overridable :: knows_stop
       procedure, non_overridable, private :: pass_clocks, break_with_clocks, attach_with_clocks, &
@@ -147,8 +156,8 @@ contains
       real(wp) :: stop
 
       stop = self%break_coordinate(self%broken + 1)
-      window%end_time = min(self%attach_time(self%attached + 1), self%end_time, &
-         & time + self%max_step)
+      window%end_time = min(self%attach_time(self%attached + 1), &
+         & self%site_time(self%sited + 1), self%end_time, time + self%max_step)
       if (self%has_clocks) then
          if (self%turns_later(self%broken + 1)) then
             if (self%hazard%lets_turn_later(velocity)) then
@@ -210,7 +219,8 @@ contains
       number = merge(self%came_count, self%broken, self%has_clocks)
    end function break_count
 
-   !> Make the events that are due: first contacts break, then contacts attach.
+   !> Make the events that are due: first contacts break, then contacts attach, then sites touch or
+   !> separate.
    subroutine pass(self, time, displacement)
       class(schedule_type), intent(inout) :: self
       !> Time [s] and displacement of the slider [m]
@@ -231,6 +241,10 @@ contains
       if (self%attach_time(self%attached + 1) <= time) then
          if (allocated(self%strength)) call self%fit_to_track(time, displacement)
          call self%attach_due(time, displacement)
+      end if
+      if (self%site_time(self%sited + 1) <= time &
+         & .and. self%attach_time(self%attached + 1) > time) then
+         call self%follow_load(time, displacement)
       end if
       self%is_over = self%broken == self%breaks .or. time >= self%end_time &
          & .or. self%attach_time(self%attached + 1) <= time &
@@ -341,7 +355,7 @@ contains
       class(schedule_type), intent(inout) :: self
       real(wp), intent(in) :: time, displacement
 
-      real(wp) :: origin, ahead
+      real(wp) :: origin
       integer :: event
 
       do event = self%attached + 1, self%attachments
@@ -354,15 +368,56 @@ contains
          if (self%detached == 0) self%drag = accumulator_type()
          call self%stiffness%add(self%attach_stiffness(event))
          call self%offset%add(self%attach_stiffness(event) * origin)
-         self%behind = max(self%behind, self%direction * origin - self%attach_limit(event))
-         ahead = self%direction * origin + self%attach_limit(event)
-         do while (self%breaks > self%broken)
-            if (self%break_coordinate(self%breaks) < ahead) exit
-            self%breaks = self%breaks - 1
-         end do
+         call self%cut_breaks(origin, self%attach_limit(event))
       end do
       self%attached = event - 1
    end subroutine attach_due
+
+   !> Let all sites touch or separate that are due. The contact of one that touches bears no force.
+   subroutine follow_load(self, time, displacement)
+      class(schedule_type), intent(inout) :: self
+      real(wp), intent(in) :: time, displacement
+
+      integer :: event
+
+      do event = self%sited + 1, self%sites
+         if (self%site_time(event) > time) exit
+         self%site_displacement(event) = displacement
+         associate (stiffness => self%site_stiffness(event))
+            if (self%site_touches(event)) then
+               self%pinned = self%pinned + 1
+               call self%stiffness%add(stiffness)
+               call self%offset%add(stiffness * displacement)
+               call self%cut_breaks(displacement, self%site_limit(event))
+            else
+               self%pinned = self%pinned - 1
+               call self%stiffness%add(-stiffness)
+               call self%offset%add(-stiffness * self%site_origin(event))
+               if (self%pinned == 0) then
+                  self%stiffness = accumulator_type()
+                  self%offset = accumulator_type()
+               end if
+            end if
+         end associate
+      end do
+      self%sited = event - 1
+   end subroutine follow_load
+
+   !> End the list of breaks before a contact that is not in it.
+   subroutine cut_breaks(self, origin, limit)
+      class(schedule_type), intent(inout) :: self
+      !> Origin of the contact, and its stretch at breaking [m]
+      real(wp), intent(in) :: origin, limit
+
+      real(wp) :: ahead
+
+      self%behind = max(self%behind, self%direction * origin - limit)
+      ahead = self%direction * origin + limit
+      do while (self%breaks > self%broken)
+         if (self%break_coordinate(self%breaks) < ahead) exit
+         self%breaks = self%breaks - 1
+      end do
+   end subroutine cut_breaks
 
    !> The same as pass with clocks: contacts break by their clock, then by coordinate, then others
    !> attach. At the end of the schedule further events that are due are left to the contacts.

@@ -62,6 +62,7 @@ contains
       allocate (ensemble)
       ensemble%parameters = common
       ensemble%keeps_offers = .true.
+      ensemble%lists_sites = .true.
       call ensemble%allocate_records(columns, rows, error)
       if (allocated(error)) return
       ! A contact that attaches in backward motion starts with the back force against the direction.
@@ -132,6 +133,7 @@ contains
       call self%list_attachments(min(limit, max_events, number + 4), pose%direction, schedule, &
          & contact)
       call self%list_births(self%listed(:number), 0, pose%direction, schedule)
+      call self%list_sites(min(limit, max_events), self%listed(:number), schedule)
       schedule%is_over = .false.
    end subroutine plan
 
@@ -152,6 +154,7 @@ contains
       schedule%break_coordinate(1) = -self%behind
       schedule%behind = -self%queue%first_key
       call self%list_attachments(limit, schedule%direction, schedule, contact)
+      call self%list_sites(limit, [integer ::], schedule)
       schedule%has_births = .false.
       schedule%is_over = .false.
    end subroutine plan_back
@@ -177,6 +180,7 @@ contains
          end do
          self%behind = schedule%behind
       end if
+      call self%move_listed(schedule, pose)
       ! A contact that broke just now and attaches at once was not in the schedule.
       if (schedule%is_over) call self%attach_due(pose)
       self%detached_count = real(self%detached%count, wp)

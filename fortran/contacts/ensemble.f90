@@ -114,7 +114,7 @@ contains
       if (self%track%columns > 0 .or. .not. self%knows_lives()) return
       schedule%is_bounded = pose%direction * self%direction < 0.0_wp
       if (schedule%is_bounded) then
-         call self%plan_back(min(limit, max_events, events_back), schedule)
+         call self%plan_back(min(limit, max_events), schedule)
          return
       end if
       call self%queue%preview(self%record, min(limit, max_events), self%listed, &
@@ -140,7 +140,7 @@ contains
    !> Write a schedule of backward motion: attachments, up to where a contact may break.
    subroutine plan_back(self, limit, schedule)
       class(contact_ensemble_type), intent(inout) :: self
-      !> Maximum number of attachments
+      !> Maximum number of events of a kind
       integer, intent(in) :: limit
       !> The schedule
       type(schedule_type), intent(inout) :: schedule
@@ -153,7 +153,7 @@ contains
       schedule%moments = 0
       schedule%break_coordinate(1) = -self%behind
       schedule%behind = -self%queue%first_key
-      call self%list_attachments(limit, schedule%direction, schedule, contact)
+      call self%list_attachments(min(limit, events_back), schedule%direction, schedule, contact)
       call self%list_sites(limit, [integer ::], schedule)
       schedule%has_births = .false.
       schedule%is_over = .false.

@@ -33,6 +33,8 @@ module mesoslip_contacts_individual_base
    integer, parameter :: snapshot_block = 256
    !> Length of a schedule over the breaks between two changes of the normal load
    real(wp), parameter :: length_ratio = 1.5_wp
+   !> Minimum number of sites in a schedule that may touch or separate
+   integer, parameter :: min_sites = 4
 
    !> N individual contacts.
    type, abstract, extends(contacts_type) :: individual_contacts_type
@@ -61,6 +63,8 @@ module mesoslip_contacts_individual_base
       !> Whether the kind lists sites that touch or separate in schedules, and those sites
       logical :: lists_sites = .false.
       integer, private :: site_listed(max_events) = 0
+      !> Maximum number of those sites, by how many moved in the last schedule
+      integer, private :: max_sites = max_events
    contains
       procedure :: law => total_law
       procedure :: snapshot => snapshot_individual
@@ -448,8 +452,8 @@ contains
       if (.not. self%sites%next_time < huge(1.0_wp)) return
       ! The contact of a site that touches has a threshold of its own, or one by its place.
       if (allocated(self%births%force) .or. self%parameters%strength%is_used) return
-      call self%sites%preview(self%parameters, limit, self%site_listed, schedule%site_touches, &
-         & schedule%site_time, number)
+      call self%sites%preview(self%parameters, min(limit, self%max_sites), self%site_listed, &
+         & schedule%site_touches, schedule%site_time, number)
       do event = 1, number
          associate (contact => self%site_listed(event))
             if (schedule%site_touches(event)) then
@@ -714,6 +718,7 @@ contains
          end associate
       end do
       call self%sites%take_previewed(self%parameters, schedule%site_touches(:schedule%sited))
+      self%max_sites = min(max_events, min_sites + 2 * schedule%sited)
    end subroutine move_listed
 
    !> Sort all contacts again from the records, and recompute the bound behind.

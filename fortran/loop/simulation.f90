@@ -12,6 +12,7 @@ module mesoslip_loop_simulation
    use mesoslip_loop_transitions, only: look_for_steady, shift_origin, take_next_part
    use mesoslip_numerics_errors, only: error_type, raise, status_invalid, status_stalled
    use mesoslip_numerics_kinds, only: i8, wp
+   use mesoslip_sliders_base, only: slider_type
    use mesoslip_sliders_instant, only: instant_slider_type
    use mesoslip_sliders_interface_row, only: row_slider_type
    use mesoslip_sliders_scheduled, only: scheduled_slider_type
@@ -22,6 +23,8 @@ module mesoslip_loop_simulation
 
    !> Share of the time of a part of the drive that is no progress for all of them together
    real(wp), parameter :: tiny_part = 1.0e-20_wp
+   !> Families of sliders: in equilibrium with the contacts; that run through schedules; rows; others
+   integer, parameter :: instant = 1, scheduled = 2, row = 3, other = 4
    !> Time at which nothing happens
    real(wp), parameter :: never = huge(1.0_wp)
 
@@ -122,7 +125,10 @@ contains
 
       type(segment_type) :: segment
       integer(i8) :: advances
+      integer :: family
 
+      ! Once, as it takes some time.
+      family = family_of(self%slider)
       segment = new_segment(self%advances, self%contacts%breaks, max_advances, max_work)
       do while (self%ending == ending_none)
          if (self%slider%can_pause()) then
@@ -132,7 +138,7 @@ contains
             if (self%ruptures%is_full()) exit
          end if
          advances = self%advances
-         call self%advance(segment)
+         call self%advance(family, segment)
          call segment%add(self%advances - advances, self%slider%cost + self%contacts%cost)
          if (allocated(self%slider%failure)) then
             error = self%slider%failure
@@ -148,26 +154,47 @@ contains
       call self%report_failure(error)
    end subroutine run
 
-   !> Some advances, by the loop for this family of sliders.
-   subroutine advance(self, segment)
+   !> Family of a slider.
+   pure function family_of(slider) result(family)
+      class(slider_type), intent(in) :: slider
+      integer :: family
+
+      select type (slider)
+      class is (instant_slider_type)
+         family = instant
+      class is (scheduled_slider_type)
+         family = scheduled
+      class is (row_slider_type)
+         family = row
+      class default
+         family = other
+      end select
+   end function family_of
+
+   !> Some advances, by the loop for a family of sliders.
+   subroutine advance(self, family, segment)
       class(simulation_type), intent(inout), target :: self
+      integer, intent(in) :: family
       type(segment_type), intent(in) :: segment
 
-      select type (slider => self%slider)
-      class is (instant_slider_type)
-         call advance_in_equilibrium(self, slider, segment)
-      class is (scheduled_slider_type)
+      select case (family)
+      case (scheduled)
          call advance_through_schedule(self, segment)
-      class is (row_slider_type)
-         select type (contacts => self%contacts)
-         type is (contact_row_type)
-            call advance_row(self, slider, contacts)
-         class default
-            call advance_to_event(self)
+         return
+      case (instant, row)
+         select type (slider => self%slider)
+         class is (instant_slider_type)
+            call advance_in_equilibrium(self, slider, segment)
+            return
+         class is (row_slider_type)
+            select type (contacts => self%contacts)
+            type is (contact_row_type)
+               call advance_row(self, slider, contacts)
+               return
+            end select
          end select
-      class default
-         call advance_to_event(self)
       end select
+      call advance_to_event(self)
    end subroutine advance
 
    !> Make sure that advances change time or displacement. Steps that become shorter without end do

@@ -20,6 +20,7 @@ program test_schedules
    call runs_ahead("loaded", "rigid", "gaussian", 0.1_wp, 5.0e-4_wp)
    call runs_ahead("loaded", "rigid", "exponential", 1.0_wp, 0.0_wp)
    call runs_ahead("loaded", "prescribed", "gaussian", 0.1_wp, 5.0e-4_wp)
+   call runs_ahead("loaded", "prescribed", "exponential", 1.0_wp, 5.0e-4_wp)
    call runs_ahead("ageing", "prescribed", "gaussian", 0.1_wp, 5.0e-4_wp)
    call runs_ahead("ageing", "prescribed", "exponential", 1.0_wp, 0.0_wp)
    call runs_ahead("thermal", "rigid", "gaussian", 0.1_wp, 5.0e-4_wp)

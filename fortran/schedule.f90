@@ -70,7 +70,7 @@ module mesoslip_schedule
       !> each its time [s], followed by that of the first one beyond the list; whether it touches;
       !> stiffness [N/m], origin if it separates [m], and stretch at breaking if it touches [m];
       !> displacement [m] of past ones
-      integer :: sites = 0, sited = 0
+      integer :: sites = 0, moved = 0
       real(wp) :: site_time(max_events + 1) = huge(1.0_wp)
       logical :: site_touches(max_events) = .false.
       real(wp) :: site_stiffness(max_events) = 0.0_wp, site_origin(max_events) = 0.0_wp, &
@@ -126,8 +126,11 @@ module mesoslip_schedule
       procedure, non_overridable :: break_count
       !> Make the events that are due at a time and a displacement
       procedure, non_overridable :: pass
-      procedure, non_overridable, private :: break_due, attach_due, follow_load, fit_to_track, &
+      procedure, non_overridable, private :: break_due, attach_due, fit_to_track, &
          & insert_attachment, cut_breaks
+      !> Let sites touch or separate: by dispatch, as a copy of it in pass would keep that from being
+      !> inlined into the loops of sliders
+      procedure, private :: follow_load
       !> Whether the end of the next step is known
       procedure, non_overridable :: knows_stop
       procedure, non_overridable, private :: pass_clocks, break_with_clocks, attach_with_clocks, &
@@ -157,7 +160,7 @@ contains
 
       stop = self%break_coordinate(self%broken + 1)
       window%end_time = min(self%attach_time(self%attached + 1), &
-         & self%site_time(self%sited + 1), self%end_time, time + self%max_step)
+         & self%site_time(self%moved + 1), self%end_time, time + self%max_step)
       if (self%has_clocks) then
          if (self%turns_later(self%broken + 1)) then
             if (self%hazard%lets_turn_later(velocity)) then
@@ -242,10 +245,7 @@ contains
          if (allocated(self%strength)) call self%fit_to_track(time, displacement)
          call self%attach_due(time, displacement)
       end if
-      if (self%site_time(self%sited + 1) <= time &
-         & .and. self%attach_time(self%attached + 1) > time) then
-         call self%follow_load(time, displacement)
-      end if
+      if (self%site_time(self%moved + 1) <= time) call self%follow_load(time, displacement)
       self%is_over = self%broken == self%breaks .or. time >= self%end_time &
          & .or. self%attach_time(self%attached + 1) <= time &
          & .or. abs(displacement) * self%mean_stiffness >= self%max_force
@@ -380,7 +380,9 @@ contains
 
       integer :: event
 
-      do event = self%sited + 1, self%sites
+      ! Contacts that are not listed, and are due, attach before.
+      if (self%attach_time(self%attached + 1) <= time) return
+      do event = self%moved + 1, self%sites
          if (self%site_time(event) > time) exit
          self%site_displacement(event) = displacement
          associate (stiffness => self%site_stiffness(event))
@@ -400,7 +402,7 @@ contains
             end if
          end associate
       end do
-      self%sited = event - 1
+      self%moved = event - 1
    end subroutine follow_load
 
    !> End the list of breaks before a contact that is not in it.

@@ -12,7 +12,6 @@ module mesoslip_loop_simulation
    use mesoslip_loop_transitions, only: look_for_steady, shift_origin, take_next_part
    use mesoslip_numerics_errors, only: error_type, raise, status_invalid, status_stalled
    use mesoslip_numerics_kinds, only: i8, wp
-   use mesoslip_sliders_base, only: slider_type
    use mesoslip_sliders_instant, only: instant_slider_type
    use mesoslip_sliders_interface_row, only: row_slider_type
    use mesoslip_sliders_scheduled, only: scheduled_slider_type
@@ -23,8 +22,6 @@ module mesoslip_loop_simulation
 
    !> Share of the time of a part of the drive that is no progress for all of them together
    real(wp), parameter :: tiny_part = 1.0e-20_wp
-   !> Families of sliders: in equilibrium with the contacts; that run through schedules; rows; others
-   integer, parameter :: instant = 1, scheduled = 2, row = 3, other = 4
    !> Time at which nothing happens
    real(wp), parameter :: never = huge(1.0_wp)
 
@@ -125,10 +122,14 @@ contains
 
       type(segment_type) :: segment
       integer(i8) :: advances
-      integer :: family
+      logical :: is_scheduled
 
-      ! Once, as it takes some time.
-      family = family_of(self%slider)
+      ! Once, as this takes some time.
+      is_scheduled = .false.
+      select type (slider => self%slider)
+      class is (scheduled_slider_type)
+         is_scheduled = .true.
+      end select
       segment = new_segment(self%advances, self%contacts%breaks, max_advances, max_work)
       do while (self%ending == ending_none)
          if (self%slider%can_pause()) then
@@ -138,7 +139,7 @@ contains
             if (self%ruptures%is_full()) exit
          end if
          advances = self%advances
-         call self%advance(family, segment)
+         call self%advance(is_scheduled, segment)
          call segment%add(self%advances - advances, self%slider%cost + self%contacts%cost)
          if (allocated(self%slider%failure)) then
             error = self%slider%failure
@@ -154,47 +155,30 @@ contains
       call self%report_failure(error)
    end subroutine run
 
-   !> Family of a slider.
-   pure function family_of(slider) result(family)
-      class(slider_type), intent(in) :: slider
-      integer :: family
-
-      select type (slider)
-      class is (instant_slider_type)
-         family = instant
-      class is (scheduled_slider_type)
-         family = scheduled
-      class is (row_slider_type)
-         family = row
-      class default
-         family = other
-      end select
-   end function family_of
-
-   !> Some advances, by the loop for a family of sliders.
-   subroutine advance(self, family, segment)
+   !> Some advances, by the loop for this family of sliders.
+   subroutine advance(self, is_scheduled, segment)
       class(simulation_type), intent(inout), target :: self
-      integer, intent(in) :: family
+      !> Whether the slider runs through schedules
+      logical, intent(in) :: is_scheduled
       type(segment_type), intent(in) :: segment
 
-      select case (family)
-      case (scheduled)
+      if (is_scheduled) then
          call advance_through_schedule(self, segment)
          return
-      case (instant, row)
-         select type (slider => self%slider)
-         class is (instant_slider_type)
-            call advance_in_equilibrium(self, slider, segment)
-            return
-         class is (row_slider_type)
-            select type (contacts => self%contacts)
-            type is (contact_row_type)
-               call advance_row(self, slider, contacts)
-               return
-            end select
+      end if
+      select type (slider => self%slider)
+      class is (instant_slider_type)
+         call advance_in_equilibrium(self, slider, segment)
+      class is (row_slider_type)
+         select type (contacts => self%contacts)
+         type is (contact_row_type)
+            call advance_row(self, slider, contacts)
+         class default
+            call advance_to_event(self)
          end select
+      class default
+         call advance_to_event(self)
       end select
-      call advance_to_event(self)
    end subroutine advance
 
    !> Make sure that advances change time or displacement. Steps that become shorter without end do

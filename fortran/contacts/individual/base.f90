@@ -419,7 +419,7 @@ contains
       schedule%attachments = number
       schedule%attached = 0
       schedule%sites = 0
-      schedule%sited = 0
+      schedule%moved = 0
       schedule%site_time(1) = self%sites%next_time
       schedule%delay = self%parameters%delay
       if (self%parameters%strength%is_used) then
@@ -700,7 +700,7 @@ contains
 
       integer :: event
 
-      do event = 1, schedule%sited
+      do event = 1, schedule%moved
          associate (contact => self%site_listed(event), stiffness => schedule%site_stiffness(event))
             if (schedule%site_touches(event)) then
                self%record(row_origin, contact) = schedule%site_displacement(event)
@@ -717,8 +717,8 @@ contains
             end if
          end associate
       end do
-      call self%sites%take_previewed(self%parameters, schedule%site_touches(:schedule%sited))
-      self%max_sites = min(max_events, min_sites + 2 * schedule%sited)
+      call self%sites%take_previewed(self%parameters, schedule%site_touches(:schedule%moved))
+      self%max_sites = min(max_events, min_sites + 2 * schedule%moved)
    end subroutine move_listed
 
    !> Sort all contacts again from the records, and recompute the bound behind.

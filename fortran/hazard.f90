@@ -25,10 +25,10 @@ module mesoslip_hazard
    !> Hazard that is negligible: it is below the rounding of a deviate
    real(wp), parameter :: negligible = 1.0e-16_wp
    !> Maximum exponent of the rate of a contact whose force changed its sign, over that without a
-   !> force, and duration of a motion up to there over that at the present velocity
-   real(wp), parameter :: max_turn_exponent = 1.0_wp, max_turn_ratio = 2.0_wp
-   !> Velocity at which that is endless [m/s]
-   real(wp), parameter :: min_velocity = 1.0e-100_wp
+   !> force; minimum threshold of such a contact over the mean one; and maximum exponent of the
+   !> duration for which its hazard is negligible
+   real(wp), parameter :: max_turn_exponent = 1.0_wp, min_turn_threshold = 0.9_wp, &
+      & max_duration_exponent = 300.0_wp
 
    !> The clocks.
    type :: hazard_type
@@ -42,6 +42,10 @@ module mesoslip_hazard
          & max_exponent(clocks) = 0.0_wp
       !> Reading at which the next contact breaks [s]
       real(wp) :: next(clocks) = never
+      !> For forces that change their sign: maximum distance from there to where they are changed
+      !> [m], minimum stretch at the threshold of such contacts [m], and maximum duration of the
+      !> motion [s]
+      real(wp) :: turn_distance = 0.0_wp, turn_limit = 0.0_wp, turn_duration = 0.0_wp
    contains
       !> Clocks for a slider, and their readings after it has advanced them
       procedure, non_overridable :: offer, advance
@@ -52,9 +56,9 @@ module mesoslip_hazard
       !> Exponent of the factor between a deviate and the increase of the clock, the key of a
       !> contact, and its remaining deviate
       procedure, non_overridable :: life_exponent, key, left
-      !> For forces that change their sign: maximum distance and duration of a motion until they are
-      !> changed, and the threshold from which the hazard in it is negligible
-      procedure, non_overridable :: turn_distance, turn_duration, turn_limit
+      !> For forces that change their sign: where and how long their hazard is negligible, and
+      !> whether a motion is fast enough that they need no step of their own
+      procedure, non_overridable :: limit_turns, lets_turn_later
    end type hazard_type
 
 contains
@@ -154,35 +158,28 @@ contains
       exponent = self%slope * (limit + force_sign(number) * (origin - self%reference(number)))
    end function life_exponent
 
-   !> Maximum distance from where the sign of a force changes to where it is changed [m].
-   pure function turn_distance(self) result(distance)
-      class(hazard_type), intent(in) :: self
-      real(wp) :: distance
+   !> Set where and how long it makes no difference when a force changes its sign, as the hazard of
+   !> the contact until then is negligible.
+   pure subroutine limit_turns(self, stretch)
+      class(hazard_type), intent(inout) :: self
+      !> Mean stretch at the threshold [m]
+      real(wp), intent(in) :: stretch
 
-      distance = max_turn_exponent / self%slope
-   end function turn_distance
+      self%turn_distance = max_turn_exponent / self%slope
+      self%turn_limit = min_turn_threshold * stretch
+      self%turn_duration = negligible / self%rate * exp(min(max_duration_exponent, &
+         & self%slope * self%turn_limit - max_turn_exponent))
+   end subroutine limit_turns
 
-   !> Maximum duration of a motion in which a force may change its sign at any time [s].
-   pure function turn_duration(self, velocity) result(duration)
-      class(hazard_type), intent(in) :: self
-      !> Velocity of the slider [m/s]
-      real(wp), intent(in) :: velocity
-      real(wp) :: duration
-
-      duration = max_turn_ratio * self%turn_distance() / max(abs(velocity), min_velocity)
-   end function turn_duration
-
-   !> Minimum stretch at the threshold of contacts for which it makes no difference when in such a
-   !> motion their forces change their sign [m]: their hazard until the end is negligible.
-   pure function turn_limit(self, velocity) result(limit)
+   !> Whether the slider moves by the maximum distance in the maximum duration.
+   pure function lets_turn_later(self, velocity)
       class(hazard_type), intent(in) :: self
       !> Velocity of the slider [m/s]
       real(wp), intent(in) :: velocity
-      real(wp) :: limit
+      logical :: lets_turn_later
 
-      limit = (log(self%rate / negligible) + log(self%turn_duration(velocity)) &
-         & + max_turn_exponent) / self%slope
-   end function turn_limit
+      lets_turn_later = abs(velocity) * self%turn_duration >= self%turn_distance
+   end function lets_turn_later
 
    !> Reading at which a contact breaks; never if it overflows: it is computed again after the
    !> reference has moved.

@@ -17,10 +17,12 @@ module mesoslip_schedule
    implicit none
    private
 
-   public :: schedule_type, max_events
+   public :: schedule_type, max_events, max_turns
 
    !> Maximum number of breaks, and of attachments, in a schedule
    integer, parameter :: max_events = 64
+   !> Maximum number of contacts whose forces change their sign in a step without ending it
+   integer, parameter :: max_turns = 8
 
    !> Coming and past events.
    type :: schedule_type
@@ -64,6 +66,15 @@ module mesoslip_schedule
          & attach_drag(max_events) = 0.0_wp
       !> Displacements of past attachments [m]
       real(wp) :: attach_displacement(max_events) = 0.0_wp
+      !> Listed sites that touch or separate as the normal load changes, and those that have. For
+      !> each its time [s], followed by that of the first one beyond the list; whether it touches;
+      !> stiffness [N/m], origin if it separates [m], and stretch at breaking if it touches [m];
+      !> displacement [m] of past ones
+      integer :: sites = 0, moved = 0
+      real(wp) :: site_time(max_events + 1) = huge(1.0_wp)
+      logical :: site_touches(max_events) = .false.
+      real(wp) :: site_stiffness(max_events) = 0.0_wp, site_origin(max_events) = 0.0_wp, &
+         & site_limit(max_events) = 0.0_wp, site_displacement(max_events) = 0.0_wp
       !> Strength along the track, which multiplies breaking stretches where contacts attach; not
       !> allocated where there is none
       class(track_strength_type), allocatable :: strength
@@ -92,8 +103,9 @@ module mesoslip_schedule
       logical :: break_gone(max_events) = .false., clock_gone(max_events) = .false.
       !> For each entry by coordinate whether the contact does not break there, but its force gets
       !> the sign of the motion; its stretch at breaking [m], its remaining deviate, and its reading
-      !> [s], by the other clock before that and by this one after it
-      logical :: break_turns(max_events) = .false.
+      !> [s], by the other clock before that and by this one after it. Whether its hazard is
+      !> negligible where that happens, so that the step needs not end there
+      logical :: break_turns(max_events) = .false., turns_later(max_events) = .false.
       real(wp) :: turn_limit(max_events) = 0.0_wp, turn_left(max_events) = 0.0_wp, &
          & turn_key(max_events) = 0.0_wp
       !> Past changes of sign; contacts of the other clock, and the entry of the first of them to
@@ -115,9 +127,14 @@ module mesoslip_schedule
       !> Make the events that are due at a time and a displacement
       procedure, non_overridable :: pass
       procedure, non_overridable, private :: break_due, attach_due, fit_to_track, &
-         & insert_attachment
+         & insert_attachment, cut_breaks
+      !> Let sites touch or separate: by dispatch, as a copy of it in pass would keep that from being
+      !> inlined into the loops of sliders
+      procedure, private :: follow_load
+      !> Whether the end of the next step is known
+      procedure, non_overridable :: knows_stop
       procedure, non_overridable, private :: pass_clocks, break_with_clocks, attach_with_clocks, &
-         & change_sign, cut_lists, skip_gone
+         & change_sign, cut_lists, skip_gone, find_stop
    end type schedule_type
 
 contains
@@ -133,23 +150,69 @@ contains
    end function law
 
    !> Window until the next event, before the end of the schedule.
-   pure function window(self, time)
+   pure function window(self, time, velocity)
       class(schedule_type), intent(in) :: self
-      !> Time now [s]
-      real(wp), intent(in) :: time
+      !> Time now [s], and velocity [m/s]
+      real(wp), intent(in) :: time, velocity
       type(window_type) :: window
 
+      real(wp) :: stop
+
+      stop = self%break_coordinate(self%broken + 1)
+      window%end_time = min(self%attach_time(self%attached + 1), &
+         & self%site_time(self%moved + 1), self%end_time, time + self%max_step)
+      if (self%has_clocks) then
+         if (self%turns_later(self%broken + 1)) then
+            if (self%hazard%lets_turn_later(velocity)) then
+               call self%find_stop(stop)
+               window%end_time = min(window%end_time, time + self%hazard%turn_duration)
+            end if
+         end if
+      end if
       if (self%direction > 0.0_wp) then
-         window%upper = self%break_coordinate(self%broken + 1)
+         window%upper = stop
          window%lower = self%behind
       else
          window%upper = -self%behind
-         window%lower = -self%break_coordinate(self%broken + 1)
+         window%lower = -stop
       end if
-      window%end_time = min(self%attach_time(self%attached + 1), self%end_time, &
-         & time + self%max_step)
       if (self%has_clocks) call self%hazard%limit_window(window)
    end function window
+
+   !> Coordinate up to which forces change their sign without a step of their own; huge if it is not
+   !> known.
+   pure subroutine find_stop(self, stop)
+      class(schedule_type), intent(in) :: self
+      !> The coordinate [m]
+      real(wp), intent(out) :: stop
+
+      integer :: event, turns
+
+      turns = 0
+      stop = huge(1.0_wp)
+      do event = self%broken + 1, self%breaks
+         if (self%break_gone(event)) cycle
+         stop = min(self%break_coordinate(event), &
+            & self%break_coordinate(self%broken + 1) + self%hazard%turn_distance)
+         if (stop < self%break_coordinate(event) .or. turns == max_turns &
+            & .or. .not. self%turns_later(event)) return
+         turns = turns + 1
+      end do
+      stop = huge(1.0_wp)
+   end subroutine find_stop
+
+   !> Whether it is known where the next step ends at the latest.
+   pure function knows_stop(self)
+      class(schedule_type), intent(in) :: self
+      logical :: knows_stop
+
+      real(wp) :: stop
+
+      knows_stop = .true.
+      if (.not. self%turns_later(self%broken + 1)) return
+      call self%find_stop(stop)
+      knows_stop = stop < huge(1.0_wp)
+   end function knows_stop
 
    !> Number of contacts that broke.
    pure function break_count(self) result(number)
@@ -159,7 +222,8 @@ contains
       number = merge(self%came_count, self%broken, self%has_clocks)
    end function break_count
 
-   !> Make the events that are due: first contacts break, then contacts attach.
+   !> Make the events that are due: first contacts break, then contacts attach, then sites touch or
+   !> separate.
    subroutine pass(self, time, displacement)
       class(schedule_type), intent(inout) :: self
       !> Time [s] and displacement of the slider [m]
@@ -181,6 +245,7 @@ contains
          if (allocated(self%strength)) call self%fit_to_track(time, displacement)
          call self%attach_due(time, displacement)
       end if
+      if (self%site_time(self%moved + 1) <= time) call self%follow_load(time, displacement)
       self%is_over = self%broken == self%breaks .or. time >= self%end_time &
          & .or. self%attach_time(self%attached + 1) <= time &
          & .or. abs(displacement) * self%mean_stiffness >= self%max_force
@@ -290,7 +355,7 @@ contains
       class(schedule_type), intent(inout) :: self
       real(wp), intent(in) :: time, displacement
 
-      real(wp) :: origin, ahead
+      real(wp) :: origin
       integer :: event
 
       do event = self%attached + 1, self%attachments
@@ -303,15 +368,58 @@ contains
          if (self%detached == 0) self%drag = accumulator_type()
          call self%stiffness%add(self%attach_stiffness(event))
          call self%offset%add(self%attach_stiffness(event) * origin)
-         self%behind = max(self%behind, self%direction * origin - self%attach_limit(event))
-         ahead = self%direction * origin + self%attach_limit(event)
-         do while (self%breaks > self%broken)
-            if (self%break_coordinate(self%breaks) < ahead) exit
-            self%breaks = self%breaks - 1
-         end do
+         call self%cut_breaks(origin, self%attach_limit(event))
       end do
       self%attached = event - 1
    end subroutine attach_due
+
+   !> Let all sites touch or separate that are due. The contact of one that touches bears no force.
+   subroutine follow_load(self, time, displacement)
+      class(schedule_type), intent(inout) :: self
+      real(wp), intent(in) :: time, displacement
+
+      integer :: event
+
+      ! Contacts that are not listed, and are due, attach before.
+      if (self%attach_time(self%attached + 1) <= time) return
+      do event = self%moved + 1, self%sites
+         if (self%site_time(event) > time) exit
+         self%site_displacement(event) = displacement
+         associate (stiffness => self%site_stiffness(event))
+            if (self%site_touches(event)) then
+               self%pinned = self%pinned + 1
+               call self%stiffness%add(stiffness)
+               call self%offset%add(stiffness * displacement)
+               call self%cut_breaks(displacement, self%site_limit(event))
+            else
+               self%pinned = self%pinned - 1
+               call self%stiffness%add(-stiffness)
+               call self%offset%add(-stiffness * self%site_origin(event))
+               if (self%pinned == 0) then
+                  self%stiffness = accumulator_type()
+                  self%offset = accumulator_type()
+               end if
+            end if
+         end associate
+      end do
+      self%moved = event - 1
+   end subroutine follow_load
+
+   !> End the list of breaks before a contact that is not in it.
+   subroutine cut_breaks(self, origin, limit)
+      class(schedule_type), intent(inout) :: self
+      !> Origin of the contact, and its stretch at breaking [m]
+      real(wp), intent(in) :: origin, limit
+
+      real(wp) :: ahead
+
+      self%behind = max(self%behind, self%direction * origin - limit)
+      ahead = self%direction * origin + limit
+      do while (self%breaks > self%broken)
+         if (self%break_coordinate(self%breaks) < ahead) exit
+         self%breaks = self%breaks - 1
+      end do
+   end subroutine cut_breaks
 
    !> The same as pass with clocks: contacts break by their clock, then by coordinate, then others
    !> attach. At the end of the schedule further events that are due are left to the contacts.
@@ -366,11 +474,15 @@ contains
          & .or. self%broken == self%breaks .or. self%clock_broken == self%clock_breaks &
          & .or. self%pinned == self%others
       if (self%is_over) return
+      self%is_over = .not. self%knows_stop()
+      if (self%is_over) return
       if (self%attach_time(self%attached + 1) <= time) then
          if (allocated(self%strength)) call self%fit_to_track(time, displacement)
          call self%attach_with_clocks(time, displacement)
          self%is_over = self%broken == self%breaks .or. self%clock_broken == self%clock_breaks &
             & .or. self%attach_time(self%attached + 1) <= time
+         if (self%is_over) return
+         self%is_over = .not. self%knows_stop()
          if (self%is_over) return
       end if
       self%hazard%next(self%number) = self%clock_key(self%clock_broken + 1)

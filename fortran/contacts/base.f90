@@ -123,8 +123,6 @@ module mesoslip_contacts_base
       procedure :: take_extent
       !> Number of individual contacts
       procedure :: individual_count
-      !> Time at which the normal load next changes the contacts
-      procedure :: load_time
       !> State of all individual contacts, and records of some
       procedure :: snapshot
       procedure :: records
@@ -244,15 +242,6 @@ contains
 
       number = 0
    end function individual_count
-
-   !> Time at which the normal load next changes the contacts, which ends a schedule [s]; huge for
-   !> contacts that write none.
-   pure function load_time(self) result(time)
-      class(contacts_type), intent(in) :: self
-      real(wp) :: time
-
-      time = huge(1.0_wp)
-   end function load_time
 
    !> Add up energies and errors that are kept in parts; by default there are none.
    subroutine gather(self)

@@ -62,6 +62,7 @@ contains
       allocate (ensemble)
       ensemble%parameters = common
       ensemble%keeps_offers = .true.
+      ensemble%lists_sites = .true.
       call ensemble%allocate_records(columns, rows, error)
       if (allocated(error)) return
       ! A contact that attaches in backward motion starts with the back force against the direction.
@@ -113,7 +114,7 @@ contains
       if (self%track%columns > 0 .or. .not. self%knows_lives()) return
       schedule%is_bounded = pose%direction * self%direction < 0.0_wp
       if (schedule%is_bounded) then
-         call self%plan_back(min(limit, max_events, events_back), schedule)
+         call self%plan_back(min(limit, max_events), schedule)
          return
       end if
       call self%queue%preview(self%record, min(limit, max_events), self%listed, &
@@ -132,13 +133,14 @@ contains
       call self%list_attachments(min(limit, max_events, number + 4), pose%direction, schedule, &
          & contact)
       call self%list_births(self%listed(:number), 0, pose%direction, schedule)
+      call self%list_sites(min(limit, max_events), self%listed(:number), schedule)
       schedule%is_over = .false.
    end subroutine plan
 
    !> Write a schedule of backward motion: attachments, up to where a contact may break.
    subroutine plan_back(self, limit, schedule)
       class(contact_ensemble_type), intent(inout) :: self
-      !> Maximum number of attachments
+      !> Maximum number of events of a kind
       integer, intent(in) :: limit
       !> The schedule
       type(schedule_type), intent(inout) :: schedule
@@ -151,7 +153,8 @@ contains
       schedule%moments = 0
       schedule%break_coordinate(1) = -self%behind
       schedule%behind = -self%queue%first_key
-      call self%list_attachments(limit, schedule%direction, schedule, contact)
+      call self%list_attachments(min(limit, events_back), schedule%direction, schedule, contact)
+      call self%list_sites(limit, [integer ::], schedule)
       schedule%has_births = .false.
       schedule%is_over = .false.
    end subroutine plan_back
@@ -177,6 +180,7 @@ contains
          end do
          self%behind = schedule%behind
       end if
+      call self%move_listed(schedule, pose)
       ! A contact that broke just now and attaches at once was not in the schedule.
       if (schedule%is_over) call self%attach_due(pose)
       self%detached_count = real(self%detached%count, wp)

@@ -46,7 +46,7 @@ contains
          & min(state%max_schedule, state%contacts%schedule_length), state%schedule)
       call state%stop%limit_schedule(state%schedule, state%slider%origin)
       state%schedule%end_time = min(state%slider%drive%end_of_part(), state%steady%block_end, &
-         & state%contacts%load_time())
+         & state%schedule%site_time(state%schedule%sites + 1))
       state%schedule%max_step = state%recorder%max_step()
       state%schedule%mean_stiffness = state%contacts%parameters%stiffness
       state%schedule%max_force = shift_stretches * state%contacts%parameters%static_force

@@ -122,7 +122,14 @@ contains
 
       type(segment_type) :: segment
       integer(i8) :: advances
+      logical :: is_scheduled
 
+      ! Once, as this takes some time.
+      is_scheduled = .false.
+      select type (slider => self%slider)
+      class is (scheduled_slider_type)
+         is_scheduled = .true.
+      end select
       segment = new_segment(self%advances, self%contacts%breaks, max_advances, max_work)
       do while (self%ending == ending_none)
          if (self%slider%can_pause()) then
@@ -132,7 +139,7 @@ contains
             if (self%ruptures%is_full()) exit
          end if
          advances = self%advances
-         call self%advance(segment)
+         call self%advance(is_scheduled, segment)
          call segment%add(self%advances - advances, self%slider%cost + self%contacts%cost)
          if (allocated(self%slider%failure)) then
             error = self%slider%failure
@@ -149,15 +156,19 @@ contains
    end subroutine run
 
    !> Some advances, by the loop for this family of sliders.
-   subroutine advance(self, segment)
+   subroutine advance(self, is_scheduled, segment)
       class(simulation_type), intent(inout), target :: self
+      !> Whether the slider runs through schedules
+      logical, intent(in) :: is_scheduled
       type(segment_type), intent(in) :: segment
 
+      if (is_scheduled) then
+         call advance_through_schedule(self, segment)
+         return
+      end if
       select type (slider => self%slider)
       class is (instant_slider_type)
          call advance_in_equilibrium(self, slider, segment)
-      class is (scheduled_slider_type)
-         call advance_through_schedule(self, segment)
       class is (row_slider_type)
          select type (contacts => self%contacts)
          type is (contact_row_type)

@@ -19,6 +19,8 @@ module mesoslip_sliders_hazard_clock
 
    !> Maximum change of the exponent in a part of a step, in which the rule is exact to rounding
    real(wp), parameter :: max_change = 0.5_wp
+   !> Maximum change of the exponent in a step in which the clocks advance side by side
+   real(wp), parameter :: max_passed = 100.0_wp
    !> Relative change of a time after which another iteration changes nothing: convergence is cubic
    real(wp), parameter :: converged = 1.0e-6_wp
    integer, parameter :: max_iterations = 60
@@ -115,6 +117,7 @@ contains
       else
          call try_series(clock, series, terms, step, ended_by, is_done)
       end if
+      if (.not. is_done) call try_pass(clock, series, terms, step, is_done)
       is_ended = ended_by > 0
       if (is_ended) clock(ended_by)%is_due = .true.
       if (is_done) return
@@ -136,6 +139,44 @@ contains
       end do
       is_ended = ended_by > 0
    end subroutine advance_clocks
+
+   !> Advance the clocks in a step of any length, unless one may end it.
+   pure subroutine try_pass(clock, series, terms, step, is_done)
+      type(hazard_clock_type), intent(inout) :: clock(clocks)
+      !> Coefficients of the velocity
+      real(wp), intent(in) :: series(0:)
+      integer, intent(in) :: terms
+      !> Length of the step [s]
+      real(wp), intent(in) :: step
+      !> Whether they are advanced; if not, nothing has changed
+      logical, intent(out) :: is_done
+
+      type(exponent_type) :: exponent
+      real(wp) :: change, growth, sums(clocks), length, now
+      integer :: part, parts, node, number
+
+      call expand_exponent(clock(1)%slope, series, terms, exponent)
+      change = max_change_of(exponent, step)
+      is_done = change < max_passed
+      if (is_done) is_done = .not. any(clock%is_used &
+         & .and. clock%left <= exp(change) * (clock%rate * step))
+      if (.not. is_done) return
+      parts = max(1, ceiling(change / max_change))
+      length = step / parts
+      sums = 0.0_wp
+      do part = 1, parts
+         do node = 1, points
+            now = (part - 1 + point(node)) * length
+            growth = exp(now * horner(exponent%mean, terms, now))
+            ! Both clocks have one slope but for its sign.
+            sums = sums + weight(node) * [growth, 1.0_wp / growth]
+         end do
+      end do
+      do number = 1, clocks
+         if (clock(number)%is_used) clock(number)%elapsed = clock(number)%rate * length &
+            & * merge(sums(1), sums(2), clock(number)%slope * clock(1)%slope > 0.0_wp)
+      end do
+   end subroutine try_pass
 
    !> Time from the start of a step at which a clock reaches its reading [s]; huge if it does not.
    pure function time_to_reading(clock, series, terms, step) result(time)
@@ -258,15 +299,22 @@ contains
       real(wp), intent(in) :: step
       integer :: parts
 
+      parts = max(1, ceiling(max_change_of(exponent, step) / max_change))
+   end function parts_of
+
+   !> Bound on the change of the exponent in a step.
+   pure function max_change_of(exponent, step) result(change)
+      type(exponent_type), intent(in) :: exponent
+      real(wp), intent(in) :: step
       real(wp) :: change
+
       integer :: term
 
       change = 0.0_wp
       do term = exponent%terms - 1, 0, -1
-         change = change * step + abs(exponent%mean(term))
+         change = (change + abs(exponent%mean(term))) * step
       end do
-      parts = max(1, ceiling(change * step / max_change))
-   end function parts_of
+   end function max_change_of
 
    !> Integral of the exponential function over a part of a step, relative to its start.
    pure function integral_from(exponent, start, length) result(integral)

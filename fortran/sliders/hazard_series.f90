@@ -7,7 +7,7 @@
 module mesoslip_sliders_hazard_series
    use mesoslip_interface_law, only: clocks, hazard_clock_type
    use mesoslip_numerics_kinds, only: wp
-   use mesoslip_sliders_motion_series, only: horner, inverse, max_terms
+   use mesoslip_sliders_motion_series, only: horner, inverse, max_terms, point_6, weight_6
    implicit none
    private
 
@@ -25,6 +25,11 @@ module mesoslip_sliders_hazard_series
    integer, parameter :: low_order = 10, tail = 3
    real(wp), parameter :: max_low = 0.12_wp
    real(wp), parameter :: no_change = 1.0e-16_wp
+   !> Maximum terms of the exponent in a step in which a rule of six points is exact to rounding,
+   !> and of the sum of those beyond
+   integer, parameter :: smooth_terms = 6
+   real(wp), parameter :: max_smooth(smooth_terms) = [0.12_wp, 6.0e-2_wp, 4.0e-3_wp, 3.0e-4_wp, &
+      & 1.0e-5_wp, 1.0e-5_wp], max_rest = 1.0e-10_wp
    real(wp), parameter :: max_tail(tail) = no_change * [1.0e4_wp, 1.0e2_wp, 1.0_wp]
    !> Bound on the mean of the exponential function over such a step, and one over it
    real(wp), parameter :: max_growth = 1.35_wp
@@ -55,9 +60,11 @@ contains
 
       real(wp) :: change, length, exponent(max_terms), short(short_terms)
       integer :: term
-      logical :: is_short
+      logical :: is_short, may_end
 
       ended_by = 0
+      ! Most steps end before any reading.
+      may_end = any(clock%is_used .and. clock%left <= max_growth * (clock%rate * step))
       ! Both clocks have one slope but for its sign.
       length = clock(1)%slope
       short = 0.0_wp
@@ -74,11 +81,13 @@ contains
          end do
          is_short = change * abs(length) <= no_change
       end if
-      if (is_short) then
+      is_done = is_short
+      if (is_short .and. may_end) then
          call advance_short(clock, short, step, ended_by)
-         is_done = .true.
-         return
+      else if (is_short) then
+         call pass_short(clock, short, step)
       end if
+      if (is_short) return
 
       length = clock(1)%slope
       change = 0.0_wp
@@ -87,6 +96,10 @@ contains
          exponent(term) = series(term - 1) * inverse(term) * length
          change = change + abs(exponent(term))
       end do
+      if (.not. may_end) then
+         call pass_smooth(clock, exponent, terms, step, is_done)
+         if (is_done) return
+      end if
       exponent(terms + 1:bent_order) = 0.0_wp
       is_done = change <= max_low
       if (is_done) call advance_middling(clock, exponent, step, ended_by, is_done)
@@ -293,6 +306,76 @@ contains
             & + (a_3 * e(3) + (a_2 * p_4 + (a * p_5 + p_6))))
       end associate
    end function short_means
+
+   !> Advance clocks by a part of the mean of the exponential function over a step that is even in
+   !> the exponent, and one that is odd.
+   pure subroutine pass(clock, step, even, odd)
+      type(hazard_clock_type), intent(inout) :: clock(clocks)
+      real(wp), intent(in) :: step, even, odd
+
+      integer :: number
+
+      do number = 1, clocks
+         if (clock(number)%is_used) clock(number)%elapsed = clock(number)%rate * step &
+            & * (even + sign(1.0_wp, clock(number)%slope * clock(1)%slope) * odd)
+      end do
+   end subroutine pass
+
+   !> Advance by a short step which no clock ends. The mean is the sum of its coefficients
+   !> (short_means).
+   pure subroutine pass_short(clock, e, step)
+      type(hazard_clock_type), intent(inout) :: clock(clocks)
+      !> The exponent of the first clock, over a step of length 1
+      real(wp), intent(in) :: e(short_terms)
+      real(wp), intent(in) :: step
+
+      real(wp) :: even, odd, a_2, a_3, b_2
+
+      associate (a => e(1), b => e(2), c => e(3), d => e(4))
+         a_2 = 0.5_wp * a**2
+         a_3 = inverse(3) * a * a_2
+         b_2 = 0.5_wp * b**2
+         even = 1.0_wp + (inverse(3) * a_2 + (inverse(4) * a * b &
+            & + (inverse(5) * (inverse(6) * a_2**2 + (a * c + b_2)) &
+            & + (inverse(6) * (a_3 * b + (a * d + b * c)) &
+            & + inverse(7) * (0.05_wp * a_3**2 + (a_3 * c + a_2 * b_2) &
+            & + (b * d + 0.5_wp * c**2))))))
+         odd = inverse(2) * a + (inverse(3) * b + (inverse(4) * (a_3 + c) &
+            & + (inverse(5) * (a_2 * b + d) &
+            & + (inverse(6) * (0.1_wp * a_2 * a_3 + (a_2 * c + a * b_2)) &
+            & + inverse(7) * (inverse(6) * a_2**2 * b + (a_2 * d + a * b * c))))))
+      end associate
+      call pass(clock, step, even, odd)
+   end subroutine pass_short
+
+   !> Advance by a step which no clock ends, unless the exponent changes too much.
+   pure subroutine pass_smooth(clock, exponent, terms, step, is_done)
+      type(hazard_clock_type), intent(inout) :: clock(clocks)
+      !> The exponent of the first clock, over a step of length 1
+      real(wp), intent(in) :: exponent(max_terms)
+      integer, intent(in) :: terms
+      real(wp), intent(in) :: step
+      !> Whether it is advanced; if not, nothing has changed
+      logical, intent(out) :: is_done
+
+      real(wp), dimension(size(point_6)) :: value, square, even, odd
+      integer :: term
+
+      is_done = terms >= smooth_terms
+      if (is_done) is_done = all(abs(exponent(:smooth_terms)) <= max_smooth) &
+         & .and. sum(abs(exponent(smooth_terms + 1:terms))) <= max_rest
+      if (.not. is_done) return
+      value = 0.0_wp
+      do term = terms, 1, -1
+         value = (value + exponent(term)) * point_6
+      end do
+      square = value**2
+      even = 1.0_wp + square * (0.5_wp + square * ((1.0_wp / 24.0_wp) + square &
+         & * ((1.0_wp / 720.0_wp) + square * (1.0_wp / 40320.0_wp))))
+      odd = value * (1.0_wp + square * ((1.0_wp / 6.0_wp) + square * ((1.0_wp / 120.0_wp) &
+         & + square * ((1.0_wp / 5040.0_wp) + square * (1.0_wp / 362880.0_wp)))))
+      call pass(clock, step, sum(weight_6 * even), sum(weight_6 * odd))
+   end subroutine pass_smooth
 
    !> The same of a middling step that changes the exponent little: of g = exp(e), n g_n is the sum
    !> over j of j e_j g_(n-j). The last factors come last, as the others do not wait for them.

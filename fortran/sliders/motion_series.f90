@@ -8,6 +8,7 @@ module mesoslip_sliders_motion_series
    private
 
    public :: max_terms, inverse, rounding, long_time
+   public :: point_6, weight_6
    public :: first_end, horner, slope, integral, second_integral, lever
 
    !> Maximum number of terms
@@ -20,6 +21,13 @@ module mesoslip_sliders_motion_series
    !> Duration of a step, in radians of an oscillation, from which an oscillation below the
    !> resolution of the contact force is ignored
    real(wp), parameter :: long_time = 2.0_wp
+   !> Gauss-Legendre points and weights on [0, 1]
+   real(wp), parameter :: point_6(6) = [0.033765242898423986094_wp, 0.16939530676686774317_wp, &
+      & 0.38069040695840154568_wp, 0.61930959304159845432_wp, 0.83060469323313225683_wp, &
+      & 0.96623475710157601391_wp]
+   real(wp), parameter :: weight_6(6) = [0.085662246189585172520_wp, 0.18038078652406930378_wp, &
+      & 0.23395696728634552369_wp, 0.23395696728634552369_wp, 0.18038078652406930378_wp, &
+      & 0.085662246189585172520_wp]
 
 contains
 

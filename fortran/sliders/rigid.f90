@@ -17,8 +17,8 @@ module mesoslip_sliders_rigid
    use mesoslip_sliders_motion_series, only: horner, integral
    use mesoslip_sliders_rigid_long_step, only: take_long_step
    use mesoslip_sliders_rigid_settled_step, only: try_settled_step
-   use mesoslip_sliders_rigid_short_step, only: audit, books_of, derive, find_end, keep_series, &
-      & look_ahead, move, short_step_type, step_books_type, try_short_step
+   use mesoslip_sliders_rigid_short_step, only: audit, books_of, derive, end_by_clocks, find_end, &
+      & keep_series, look_ahead, move, short_step_type, step_books_type, try_short_step
    use mesoslip_sliders_rigid_state, only: constants, drive_gap_at, few_terms, long_terms, &
       & many_terms, motion_rates, motion_rates_type, rates, rigid_motion_type, rigid_state_type, &
       & some_terms, system_type, uniform_gap
@@ -89,34 +89,25 @@ contains
       type(schedule_type), intent(inout) :: schedule
       type(step_filter_type), intent(inout) :: filter
 
-      type(system_type) :: system
-
-      if (.not. schedule%has_clocks) then
-         call run_through(self, schedule, filter)
-         return
+      ! The compiler makes a copy for each constant.
+      if (schedule%has_clocks) then
+         self%has_clocks = .true.
+         call run_through(self, schedule, filter, .true.)
+      else
+         call run_through(self, schedule, filter, .false.)
       end if
-      system = constants(self)
-      self%has_clocks = .true.
-      do
-         self%law = schedule%law()
-         call schedule%hazard%offer(self%displacement, self%clock)
-         call take_step(self, system, schedule%window(self%time))
-         call schedule%hazard%advance(self%clock)
-         call filter%examine(self%time, self%velocity, self%start_acceleration, self%acceleration)
-         if (filter%is_selected .or. self%direction * schedule%direction < 0.0_wp) return
-         call schedule%pass(self%time, self%displacement)
-         if (schedule%is_over .or. filter%steps >= filter%max_steps) return
-      end do
    end subroutine run_ahead
 
-   !> Move through a schedule without clocks. Nearly all steps are short ones. The end of a step is
+   !> Move through a schedule. Nearly all steps are short ones. The end of a step is
    !> known only after a chain of operations, each of which waits for the one before, and the
    !> processor cannot predict whether a contact breaks or attaches then. Meanwhile work and losses
    !> of the step before are added up.
-   subroutine run_through(self, schedule, filter)
+   subroutine run_through(self, schedule, filter, has_clocks)
       type(slider_rigid_type), intent(inout) :: self
       type(schedule_type), intent(inout) :: schedule
       type(step_filter_type), intent(inout) :: filter
+      !> Whether the schedule has clocks
+      logical, intent(in) :: has_clocks
 
       type(system_type) :: system
       type(interface_law_type) :: law
@@ -134,7 +125,7 @@ contains
          step_time = motion%time
          start_displacement = motion%displacement
          law = schedule%law()
-         window = schedule%window(motion%time)
+         window = schedule%window(motion%time, motion%velocity)
          system%stiffness = system%spring + law%stiffness * system%inverse_mass
          system%drag = law%drag * system%inverse_mass
          step%drive_gap = drive_gap_at(self, motion)
@@ -143,8 +134,10 @@ contains
          call look_ahead(motion, window, step)
          call derive(system, self%damping, step)
          if (is_pending) call audit(self, books, motion)
+         if (has_clocks) call schedule%hazard%offer(motion%displacement, self%clock)
          call find_end(system, self%damping, step, is_short)
          if (is_short) then
+            if (has_clocks) call end_by_clocks(self%clock, motion%time, step)
             call move(self, system, law, step, motion)
             books = books_of(step, law%drag)
          else
@@ -153,11 +146,16 @@ contains
             self%step_time = step_time
             self%start_displacement = start_displacement
             system%drive_gap = step%drive_gap
-            call take_long_step(self, system, window, step%early)
+            if (has_clocks) then
+               call take_clocked_step(self, system, window, step%early)
+            else
+               call take_long_step(self, system, window, step%early)
+            end if
             motion = self%motion()
             step%acceleration = self%acceleration
          end if
          is_pending = is_short
+         if (has_clocks) call schedule%hazard%advance(self%clock)
 
          call filter%examine(motion%time, motion%velocity, step%early%acceleration, &
             & step%acceleration)
@@ -177,21 +175,17 @@ contains
    end subroutine run_through
 
    !> One step: a short one, as nearly all between two events, or another.
-   subroutine take_step(self, constant, whole_window)
+   subroutine take_step(self, constant, window)
       type(slider_rigid_type), intent(inout) :: self
       type(system_type), intent(in) :: constant
-      type(window_type), intent(in) :: whole_window
+      type(window_type), intent(in) :: window
 
-      type(window_type) :: window
       type(system_type) :: system
       type(motion_rates_type) :: early
       logical :: is_done
 
       self%step_time = self%time
       self%start_displacement = self%displacement
-      window = whole_window
-      if (self%has_clocks) call limit_window(self%clock, self%time, self%velocity, &
-         & self%acceleration, window)
 
       system = constant
       system%stiffness = system%spring + self%law%stiffness * system%inverse_mass
@@ -208,13 +202,41 @@ contains
          system%driving = constant%driving - self%law%rate * system%inverse_mass
          system%drive_gap = uniform_gap(self)
          early = rates(self, system, system%drive_gap)
-         if (self%has_clocks .or. self%law%tolerance > 0.0_wp) then
+         if (self%law%tolerance > 0.0_wp) then
             call try_settled_step(self, system, window, early, is_done)
          end if
          if (.not. is_done) call try_short_step(self, system, window, early, is_done)
       end if
-      if (.not. is_done) call take_long_step(self, system, window, early)
+      if (is_done) return
+      if (self%has_clocks) then
+         call take_clocked_step(self, system, window, early)
+      else
+         call take_long_step(self, system, window, early)
+      end if
    end subroutine take_step
+
+   !> A step with clocks which is no short one in its whole window.
+   subroutine take_clocked_step(self, system, whole_window, early)
+      type(slider_rigid_type), intent(inout) :: self
+      type(system_type), intent(in) :: system
+      type(window_type), intent(in) :: whole_window
+      !> The motion at the start of the step
+      type(motion_rates_type), intent(in) :: early
+
+      type(window_type) :: window
+      logical :: is_done
+
+      window = whole_window
+      call limit_window(self%clock, self%time, self%velocity, self%acceleration, window)
+      is_done = .false.
+      if (.not. abs(self%drive%acceleration) > 0.0_wp) then
+         call try_settled_step(self, system, window, early, is_done)
+         if (.not. is_done .and. window%end_time < whole_window%end_time) then
+            call try_short_step(self, system, window, early, is_done)
+         end if
+      end if
+      if (.not. is_done) call take_long_step(self, system, window, early)
+   end subroutine take_clocked_step
 
    pure subroutine complete_pose(self, pose)
       class(slider_rigid_type), intent(in) :: self

@@ -72,12 +72,17 @@ contains
       case ("thermal ageing populations")
          call new_parameters(parameters, [character(len=name_length) :: common, ageing, &
             & activation(3:), "resolution"], [values, relax, bell(3:), 0.5_wp])
-      case ("thermal", "thermal scattered")
+      case ("thermal", "thermal scattered", "thermal cold")
          call new_parameters(parameters, [character(len=name_length) :: common, activation], &
             & [values, bell])
       case ("thermal ageing", "thermal ageing cold")
          call new_parameters(parameters, [character(len=name_length) :: common, ageing, &
             & activation], [values, relax, bell])
+      case ("loaded")
+         ! The normal load swings some 15 times in a run.
+         call new_parameters(parameters, [character(len=name_length) :: common, "columns", &
+            & "rows", "load_mean", "load_amplitude", "load_rate", "load_phase"], &
+            & [values, 0.0_wp, 0.0_wp, 0.7_wp, 0.3_wp, 600.0_wp, 0.0_wp])
       case ("populations")
          call new_parameters(parameters, [character(len=name_length) :: common, "resolution"], &
             & [values, 0.5_wp])
@@ -87,6 +92,7 @@ contains
       end select
       call parameters%add_word("threshold_law", law)
       kind = contacts
+      if (contacts == "loaded") kind = "ensemble"
       law_of_delay = "fixed"
       if (index(contacts, "scattered") > 0) then
          kind = merge("thermal ", "ensemble", contacts(:1) == "t")

@@ -28,6 +28,12 @@ program test_hazard_clock
    call the_first_ends_the_step([1.0_wp, 5.0e-3_wp, -1.0e-4_wp], 1.9_wp, "steep, nearly linear")
    call the_first_ends_the_step(even, 0.1_wp, "middling series")
    call the_first_ends_the_step(even, 1.0e-2_wp, "short series")
+   call the_first_ends_the_step([1.0_wp, 4.0e-3_wp, 1.0e-4_wp, 2.0e-6_wp], 2.0e-2_wp, &
+      & "short series with all its terms")
+   call the_first_ends_the_step([0.2_wp, 0.4_wp, 0.05_wp, 4.0e-3_wp, 1.0e-4_wp, 1.0e-4_wp], &
+      & 0.5_wp, "smooth series")
+   call the_first_ends_the_step([1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 100.0_wp, 0.0_wp], 0.1_wp, &
+      & "series that is not smooth")
    call finish()
 
 contains

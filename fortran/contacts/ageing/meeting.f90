@@ -24,6 +24,9 @@ module mesoslip_contacts_ageing_meeting
    real(wp), parameter :: max_plain = 0.9_wp
    !> Relative change of the rate of a threshold up to which a parabola is a close bound
    real(wp), parameter :: max_bend = 0.2_wp
+   !> Age at which a contact breaks, over its threshold's growth, from which the first steps of an
+   !> iteration are a close bound on it
+   real(wp), parameter :: min_far = 10.0_wp
    !> Relative size of a step of Newton's method after which the error is below rounding
    real(wp), parameter :: max_newton_step = 1.0e-8_wp
    !> Maximum number of steps, which is reached only where a contact just does not break
@@ -85,6 +88,9 @@ contains
          time = gap * slowness
          time = (gap + (rate + bend * time) * time) * slowness
          threshold = threshold + (rate + bend * time) * time
+      else if (law%kind == ageing_log) then
+         threshold = max(threshold, meet_early(law, configured, age / law%time, stretch, &
+            & speed * law%time))
       else
          threshold = meet(law, configured, mean, age, stretch, speed)
       end if
@@ -193,6 +199,25 @@ contains
          if (abs(step) <= max_newton_step * max(1.0_wp, w)) return
       end do
    end function fallen
+
+   !> A lower bound on the threshold at which a contact breaks by the law `log`, as meet_grown finds
+   !> it: an iteration from the present age approaches the solution from below, as long as the
+   !> threshold grows more slowly than the stretch.
+   pure function meet_early(law, configured, age, stretch, scale) result(threshold)
+      type(ageing_law_type), intent(in) :: law
+      real(wp), intent(in) :: configured, age, stretch, scale
+      real(wp) :: threshold
+
+      real(wp) :: kappa, wanted
+
+      kappa = configured * law%growth / scale
+      wanted = (configured - stretch) / scale + 1.0_wp + age
+      if (wanted > max(1.0_wp, min_far * kappa)) then
+         threshold = configured * (1.0_wp + law%growth * log(wanted + kappa * log(wanted)))
+      else
+         threshold = meet_grown(law, configured, age, stretch, scale)
+      end if
+   end function meet_early
 
    !> The same as meet for the law `log`.
    !>

@@ -33,6 +33,8 @@ module mesoslip_contacts_individual_base
    integer, parameter :: snapshot_block = 256
    !> Length of a schedule over the breaks between two changes of the normal load
    real(wp), parameter :: length_ratio = 1.5_wp
+   !> Minimum number of sites in a schedule that may touch or separate
+   integer, parameter :: min_sites = 4
 
    !> N individual contacts.
    type, abstract, extends(contacts_type) :: individual_contacts_type
@@ -58,10 +60,15 @@ module mesoslip_contacts_individual_base
       real(wp) :: breaks_at_load = 0.0_wp
       !> Whether the contact that joins touches: it attaches without a force
       logical :: touches = .false.
+      !> Whether the kind lists sites that touch or separate in schedules, and those sites
+      logical :: lists_sites = .false.
+      integer, private :: site_listed(max_events) = 0
+      !> Maximum number of those sites, by how many moved in the last schedule
+      integer, private :: max_sites = max_events
    contains
       procedure :: law => total_law
       procedure :: snapshot => snapshot_individual
-      procedure :: shift_origin, elastic_energy, individual_count, records, take_extent, load_time
+      procedure :: shift_origin, elastic_energy, individual_count, records, take_extent
       !> Insert an attached contact into the order of breaking, and take a pinned one out
       procedure(join_interface), deferred :: join
       procedure :: leave
@@ -84,9 +91,9 @@ module mesoslip_contacts_individual_base
       !> Window between two coordinates
       procedure, non_overridable :: window_between
       !> List the next attachments and births in a schedule
-      procedure, non_overridable :: list_attachments, list_births, knows_lives
+      procedure, non_overridable :: list_attachments, list_births, knows_lives, list_sites
       !> Update records and sums after a schedule, but not the order of breaking
-      procedure, non_overridable :: detach_listed, attach_listed
+      procedure, non_overridable :: detach_listed, attach_listed, move_listed
       procedure, non_overridable, private :: attach_next, draw_births, give_birth, list_lives, &
          & own_excess, fit_to_track, sum_totals, follow_load, touch, separate
    end type individual_contacts_type
@@ -308,7 +315,7 @@ contains
       integer :: contact
       logical :: touches
 
-      self%schedule_length = int(min(real(max_events, wp), &
+      if (.not. self%lists_sites) self%schedule_length = int(min(real(max_events, wp), &
          & 2.0_wp + length_ratio * (self%breaks - self%breaks_at_load)))
       self%breaks_at_load = self%breaks
       do while (self%sites%next_time <= pose%time)
@@ -392,13 +399,6 @@ contains
       call raise(self%failure, status_invalid, "contacts of this kind do not separate")
    end subroutine leave
 
-   pure function load_time(self) result(time)
-      class(individual_contacts_type), intent(in) :: self
-      real(wp) :: time
-
-      time = self%sites%next_time
-   end function load_time
-
    !> List the next contacts to attach in a schedule, up to a maximum number.
    subroutine list_attachments(self, limit, direction, schedule, contact)
       class(individual_contacts_type), intent(inout) :: self
@@ -418,6 +418,9 @@ contains
          & schedule%attach_limit, schedule%attach_stretch)
       schedule%attachments = number
       schedule%attached = 0
+      schedule%sites = 0
+      schedule%moved = 0
+      schedule%site_time(1) = self%sites%next_time
       schedule%delay = self%parameters%delay
       if (self%parameters%strength%is_used) then
          if (.not. allocated(schedule%strength)) then
@@ -433,6 +436,40 @@ contains
       schedule%detached = self%detached%count
       schedule%pinned = self%pinned_count()
    end subroutine list_attachments
+
+   !> List the next sites that touch or separate in a schedule. The list ends before one whose
+   !> contact is detached, or listed to break.
+   subroutine list_sites(self, limit, breaking, schedule)
+      class(individual_contacts_type), intent(inout) :: self
+      !> Maximum number
+      integer, intent(in) :: limit
+      !> Contacts that are listed to break
+      integer, intent(in) :: breaking(:)
+      type(schedule_type), intent(inout) :: schedule
+
+      integer :: event, number
+
+      if (.not. self%sites%next_time < huge(1.0_wp)) return
+      ! The contact of a site that touches has a threshold of its own, or one by its place.
+      if (allocated(self%births%force) .or. self%parameters%strength%is_used) return
+      call self%sites%preview(self%parameters, min(limit, self%max_sites), self%site_listed, &
+         & schedule%site_touches, schedule%site_time, number)
+      do event = 1, number
+         associate (contact => self%site_listed(event))
+            if (schedule%site_touches(event)) then
+               call self%draw_births([contact])
+               call bear(self%parameters, self%record(row_next, contact), &
+                  & schedule%site_stiffness(event), schedule%site_limit(event))
+            else
+               schedule%site_stiffness(event) = self%record(row_stiffness, contact)
+               schedule%site_origin(event) = self%record(row_origin, contact)
+               if (.not. schedule%site_stiffness(event) > 0.0_wp) exit
+               if (any(breaking == contact)) exit
+            end if
+         end associate
+      end do
+      schedule%sites = event - 1
+   end subroutine list_sites
 
    !> List the next births of the contacts that break in a schedule, if they can attach within it.
    subroutine list_births(self, contact, before, direction, schedule)
@@ -653,6 +690,36 @@ contains
          call self%births%request(contact(event), self%parameters, self%record)
       end do
    end subroutine attach_listed
+
+   !> Update records for the sites that touched or separated in a schedule, after contacts broke and
+   !> attached.
+   subroutine move_listed(self, schedule, pose)
+      class(individual_contacts_type), intent(inout) :: self
+      type(schedule_type), intent(in) :: schedule
+      type(pose_type), intent(in) :: pose
+
+      integer :: event
+
+      do event = 1, schedule%moved
+         associate (contact => self%site_listed(event), stiffness => schedule%site_stiffness(event))
+            if (schedule%site_touches(event)) then
+               self%record(row_origin, contact) = schedule%site_displacement(event)
+               self%record(row_stiffness, contact) = stiffness
+               self%record(row_limit, contact) = schedule%site_limit(event)
+               call self%births%request(contact, self%parameters, self%record)
+               call self%join(contact, pose)
+            else
+               call self%leave(contact)
+               self%record(row_stiffness, contact) = 0.0_wp
+               self%record(row_renewal, contact) = self%record(row_renewal, contact) + 1.0_wp
+               call self%separation_loss%add(0.5_wp * stiffness &
+                  & * (schedule%site_displacement(event) - schedule%site_origin(event))**2)
+            end if
+         end associate
+      end do
+      call self%sites%take_previewed(self%parameters, schedule%site_touches(:schedule%moved))
+      self%max_sites = min(max_events, min_sites + 2 * schedule%moved)
+   end subroutine move_listed
 
    !> Sort all contacts again from the records, and recompute the bound behind.
    subroutine rebuild_queue(self, displacement)

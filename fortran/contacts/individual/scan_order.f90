@@ -7,7 +7,7 @@
 module mesoslip_contacts_individual_scan_order
    use mesoslip_contacts_individual_sorting, only: before, push, remove_first, sort
    use mesoslip_numerics_errors, only: error_type, raise, status_memory
-   use mesoslip_numerics_kinds, only: wp
+   use mesoslip_numerics_kinds, only: i8, wp
    implicit none
    private
 
@@ -17,8 +17,8 @@ module mesoslip_contacts_individual_scan_order
    real(wp), parameter :: max_key = 1.0e290_wp
    !> Key of a contact that is not in the order
    real(wp), parameter :: none = huge(1.0_wp)
-   !> Contacts wanted of the first scan; doubled in each scan up to this part of all contacts, 1/8
-   integer, parameter :: min_scan = 64, part = 8
+   !> Contacts wanted of the first scan; doubled in each scan up to this part of all contacts, 1/4
+   integer, parameter :: min_scan = 64, part = 4
    !> Room for late contacts before the sorted ones, and the maximum number of sorted ones that
    !> move to make room again
    integer, parameter :: slack = 64, max_moved = 4096
@@ -26,8 +26,12 @@ module mesoslip_contacts_individual_scan_order
    integer, parameter :: late_part = 16
    !> Bins in which contacts are sorted: their maximum number, mean and maximum contacts in one
    integer, parameter :: max_bins = 4096, bin_load = 4, max_load = 64
+   !> Ratio of two keys up to which those between are sorted as uniform
+   real(wp), parameter :: max_ratio = 8.0_wp
    !> Keys that are sampled to estimate a horizon
    integer, parameter :: samples = 64
+   !> Contacts wanted over those found from which that is done again
+   integer, parameter :: max_lack = 4
    !> Maximum factor by which the distance to the next horizon changes
    real(wp), parameter :: max_factor = 4.0_wp
 
@@ -281,7 +285,8 @@ contains
       self%last = last
       call sort_evenly(self%near_key(slack + 1:last), self%near_contact(slack + 1:last), start, &
          & horizon)
-      if (last == slack) self%reach = 0.0_wp
+      ! Keys that grow exponentially are estimated again: a factor would follow them too slowly.
+      if (last - slack < self%wanted / max_lack) self%reach = 0.0_wp
       if (self%reach < none / max_factor &
          & .and. (last - slack < self%wanted / 2 .or. last - slack > 2 * self%wanted)) then
          self%reach = self%reach * min(max_factor, max(1.0_wp / max_factor, &
@@ -293,7 +298,8 @@ contains
       end if
    end subroutine scan
 
-   !> Sort contacts by key, then by number; the keys are nearly uniform between two values.
+   !> Sort contacts by key, then by number; the keys are nearly uniform between two values, or their
+   !> logarithms are.
    pure subroutine sort_evenly(key, contact, start, horizon)
       real(wp), intent(inout), contiguous :: key(:)
       integer, intent(inout), contiguous :: contact(:)
@@ -303,7 +309,9 @@ contains
       integer, allocatable :: bin(:), last_contact(:)
       real(wp), allocatable :: last_key(:)
       integer :: filled(0:max_bins), bins, position, place, stat
+      integer(i8) :: first
       real(wp) :: scale
+      logical :: is_wide
 
       bins = min(max_bins, size(key) / bin_load)
       if (bins < 2 .or. .not. horizon < none) then
@@ -317,10 +325,23 @@ contains
          call sort(key, contact, size(key))
          return
       end if
-      scale = bins / (horizon - start)
+      is_wide = start > 0.0_wp .and. horizon > max_ratio * start
       filled(:bins) = 0
+      if (is_wide) then
+         ! The bits of a positive number are nearly those of its logarithm.
+         first = transfer(start, 1_i8)
+         scale = bins / real(transfer(horizon, 1_i8) - first, wp)
+         do position = 1, size(key)
+            bin(position) = min(bins, 1 + int(real(transfer(key(position), 1_i8) - first, wp) &
+               & * scale))
+         end do
+      else
+         scale = bins / (horizon - start)
+         do position = 1, size(key)
+            bin(position) = min(bins, 1 + int((key(position) - start) * scale))
+         end do
+      end if
       do position = 1, size(key)
-         bin(position) = min(bins, 1 + int((key(position) - start) * scale))
          filled(bin(position)) = filled(bin(position)) + 1
       end do
       if (maxval(filled(:bins)) > max_load) then

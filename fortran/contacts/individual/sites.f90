@@ -33,8 +33,8 @@ module mesoslip_contacts_individual_sites
       !> What happens next: a site touches, or separates, or neither
       logical, private :: touches_next = .false., separates_next = .false.
    contains
-      !> The site of an order, and the next event
-      procedure, non_overridable :: site_at, take_next
+      !> The site of an order, the next event, and the first ones of a piece, some of which happen
+      procedure, non_overridable :: site_at, take_next, preview, take_previewed
       procedure, non_overridable :: exchange
       procedure, non_overridable, private :: find_next
    end type contact_sites_type
@@ -106,6 +106,53 @@ contains
       end if
       call self%find_next(parameters)
    end subroutine take_next
+
+   !> The next sites that touch or separate.
+   subroutine preview(self, parameters, limit, site, touches, time, number)
+      class(contact_sites_type), intent(inout) :: self
+      type(contact_parameters_type), intent(in) :: parameters
+      !> Maximum number
+      integer, intent(in) :: limit
+      !> The sites, and whether each touches
+      integer, intent(out) :: site(:)
+      logical, intent(out) :: touches(:)
+      !> Their times, followed by that of the next event [s]
+      real(wp), intent(inout) :: time(:)
+      !> Their number
+      integer, intent(out) :: number
+
+      integer :: count, piece
+      logical :: has_begun
+
+      count = self%count
+      piece = self%piece
+      has_begun = self%has_begun
+      number = 0
+      time(1) = self%next_time
+      do while (number < limit .and. self%next_time < huge(1.0_wp))
+         call self%take_next(parameters, site(number + 1), touches(number + 1))
+         if (site(number + 1) == 0) exit
+         number = number + 1
+         time(number + 1) = self%next_time
+      end do
+      if (self%piece == piece .and. self%count == count) return
+      self%count = count
+      self%piece = piece
+      self%has_begun = has_begun
+      call self%find_next(parameters)
+   end subroutine preview
+
+   !> Let the first sites touch or separate, which a preview returned.
+   subroutine take_previewed(self, parameters, touches)
+      class(contact_sites_type), intent(inout) :: self
+      type(contact_parameters_type), intent(in) :: parameters
+      !> Whether each touches
+      logical, intent(in) :: touches(:)
+
+      if (size(touches) == 0) return
+      self%count = self%count + 2 * count(touches) - size(touches)
+      call self%find_next(parameters)
+   end subroutine take_previewed
 
    !> Find the next event: sites between two shares touch or separate in the order of heights.
    subroutine find_next(self, parameters)

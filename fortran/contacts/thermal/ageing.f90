@@ -27,7 +27,7 @@ module mesoslip_contacts_thermal_ageing
    use mesoslip_contacts_thermal_keys, only: exchange_thermal, life_clock, life_key, life_left, &
       & rebuild_thermal
    use mesoslip_contacts_thermal_steady, only: grown, set_up_steady
-   use mesoslip_hazard, only: force_sign, never
+   use mesoslip_hazard, only: never
    use mesoslip_interface_law, only: interface_law_type, pose_type, window_type
    use mesoslip_numerics_archive, only: archive_type
    use mesoslip_numerics_errors, only: error_type, raise, status_memory
@@ -88,7 +88,7 @@ module mesoslip_contacts_thermal_ageing
       procedure :: find_ahead, bound, gather_ahead
       procedure :: start_steadily, end_steadily, solve_newborn, begin_solved
       procedure, non_overridable, private :: set_bound, threshold, mean_of, draw_attempt, &
-         & solve_break, falling_bound, turns_ahead, may_turn_later, is_extrapolated, &
+         & solve_break, falling_bound, is_extrapolated, &
          & extrapolate, add_leader, drop_leader, break_leaders, put_turns_back
    end type thermal_ageing_contacts_type
 
@@ -140,8 +140,6 @@ contains
 
       call offer_thermal(self, pose, law, window)
       window%end_time = min(window%end_time, self%order_renewal%first())
-      if (self%turns > 0) window%end_time = min(window%end_time, pose%time &
-         & + self%hazard%turn_duration(pose%velocity))
    end subroutine offer
 
    subroutine respond(self, before, after)
@@ -173,15 +171,16 @@ contains
    !> whose bound comes before becomes a leader, with its present threshold as its bound. A force
    !> may change its sign before that where the hazard until then is negligible. Where the slider
    !> has no inertia, and may jump, there are bounds only.
-   subroutine find_ahead(self, pose, law, ahead)
+   subroutine find_ahead(self, pose, law, ahead, end_time)
       class(thermal_ageing_contacts_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
       type(interface_law_type), intent(in) :: law
       real(wp), intent(out) :: ahead
+      real(wp), intent(inout) :: end_time
 
       real(wp) :: first, latest, key(max_extrapolated)
       integer :: number, contact(max_extrapolated)
-      logical :: leads
+      logical :: leads, lets_turn_later
 
       ! A law may be offered again without a response.
       call self%put_turns_back()
@@ -192,6 +191,7 @@ contains
       end if
       latest = self%prediction%reach(pose, self%direction, min(self%detached%next_due, &
          & self%sites%next_time, self%order_renewal%first()))
+      lets_turn_later = self%hazard%lets_turn_later(pose%velocity)
       ahead = huge(1.0_wp)
       number = 0
       do
@@ -206,12 +206,13 @@ contains
                self%leaders = self%leaders - 1
             else
                call self%order(self%ahead)%due(first, one)
-               if (self%may_turn_later(one, pose%velocity)) then
+               if (lets_turn_later .and. self%turns < max_turns &
+                  & .and. self%may_turn_later(one)) then
                   call self%order(self%ahead)%remove(one)
                   self%turns = self%turns + 1
                   self%turning(self%turns) = one
                   self%turn_key(self%turns) = first
-                  ahead = min(ahead, first + self%hazard%turn_distance())
+                  ahead = min(ahead, first + self%hazard%turn_distance)
                   cycle
                end if
                if (.not. self%is_extrapolated(one)) exit
@@ -221,31 +222,11 @@ contains
          end associate
       end do
       ahead = min(ahead, first)
+      if (self%turns > 0) end_time = min(end_time, pose%time + self%hazard%turn_duration)
       do number = number, 1, -1
          call self%add_leader(contact(number), key(number))
       end do
    end subroutine find_ahead
-
-   !> Whether the force of a contact changes its sign ahead.
-   pure function turns_ahead(self, contact)
-      class(thermal_ageing_contacts_type), intent(in) :: self
-      integer, intent(in) :: contact
-      logical :: turns_ahead
-
-      turns_ahead = force_sign(int(self%life(life_clock, contact))) * self%direction < 0.0_wp
-   end function turns_ahead
-
-   !> Whether it does, and makes no difference when in a motion at a velocity [m/s].
-   pure function may_turn_later(self, contact, velocity)
-      class(thermal_ageing_contacts_type), intent(in) :: self
-      integer, intent(in) :: contact
-      real(wp), intent(in) :: velocity
-      logical :: may_turn_later
-
-      may_turn_later = self%turns_ahead(contact) .and. self%turns < max_turns
-      if (may_turn_later) may_turn_later = self%record(row_limit, contact) &
-         & >= self%hazard%turn_limit(velocity)
-   end function may_turn_later
 
    !> Whether the break of a contact at its threshold can be extrapolated: its force is along the
    !> motion, and its threshold does not fall.

@@ -10,7 +10,7 @@
 module mesoslip_contacts_thermal_contacts
    use mesoslip_contacts_base, only: contact_parameters_type, contacts_type
    use mesoslip_contacts_individual_base, only: total_law
-   use mesoslip_contacts_individual_record, only: row_origin, row_stiffness
+   use mesoslip_contacts_individual_record, only: row_limit, row_origin, row_stiffness
    use mesoslip_contacts_thermal_keys, only: life_clock, life_key, life_left, life_next, motions
    use mesoslip_contacts_thermal_steady, only: thermal_steady_type, set_up_steady
    use mesoslip_hazard, only: force_sign, never
@@ -18,7 +18,7 @@ module mesoslip_contacts_thermal_contacts
    use mesoslip_numerics_errors, only: error_type
    use mesoslip_numerics_kinds, only: i8, wp
    use mesoslip_numerics_parameters, only: parameters_type
-   use mesoslip_schedule, only: schedule_type
+   use mesoslip_schedule, only: max_turns, schedule_type
    implicit none
    private
 
@@ -33,7 +33,7 @@ module mesoslip_contacts_thermal_contacts
       procedure :: offer => offer_thermal
       procedure :: respond => respond_thermal
       procedure :: plan, settle, join, leave, begin_life, accepts_break, update_bounds, find_ahead
-      procedure, non_overridable :: break_contact
+      procedure, non_overridable :: break_contact, turns_ahead, may_turn_later
       procedure, non_overridable, private :: break_and_attach, pass_ahead, break_by_clock, &
          & respond_steadily
    end type thermal_contacts_type
@@ -111,11 +111,12 @@ contains
       type(interface_law_type), intent(out) :: law
       type(window_type), intent(out) :: window
 
-      real(wp) :: ahead
+      real(wp) :: ahead, end_time
 
       law = total_law(self)
-      call self%find_ahead(pose, law, ahead)
-      window = self%window_between(self%behind, ahead, self%detached%next_due)
+      end_time = self%detached%next_due
+      call self%find_ahead(pose, law, ahead, end_time)
+      window = self%window_between(self%behind, ahead, end_time)
       call self%set_next()
       call self%hazard%offer(pose%displacement, self%clock)
       call self%hazard%limit_window(window)
@@ -200,7 +201,7 @@ contains
       do
          call self%order(self%ahead)%due(self%direction * pose%displacement, contact)
          if (contact == 0) return
-         if (force_sign(int(self%life(life_clock, contact))) * self%direction < 0.0_wp) then
+         if (self%turns_ahead(contact)) then
             call self%change_sign(contact)
          else if (self%accepts_break(contact, pose, .false.)) then
             call self%break_contact(contact, pose)
@@ -299,16 +300,61 @@ contains
       accepts_break = .true.
    end function accepts_break
 
-   !> Coordinate before which no contact breaks at its threshold, and no force changes its sign.
-   subroutine find_ahead(self, pose, law, ahead)
+   !> Coordinate before which no contact breaks at its threshold, and no force changes its sign
+   !> unless its hazard is negligible there.
+   subroutine find_ahead(self, pose, law, ahead, end_time)
       class(thermal_contacts_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
       type(interface_law_type), intent(in) :: law
       !> The coordinate along the direction of motion [m]
       real(wp), intent(out) :: ahead
+      !> Time before which it is used [s]
+      real(wp), intent(inout) :: end_time
+
+      real(wp) :: last, key(max_turns)
+      integer :: contact, turns, turning(max_turns)
 
       call self%order(self%ahead)%first(ahead)
+      if (.not. self%hazard%lets_turn_later(pose%velocity)) return
+      ! As in a schedule.
+      last = ahead + self%hazard%turn_distance
+      turns = 0
+      do while (ahead <= last .and. turns < max_turns)
+         call self%order(self%ahead)%due(ahead, contact)
+         if (contact == 0) exit
+         if (.not. self%may_turn_later(contact)) exit
+         call self%order(self%ahead)%remove(contact)
+         turns = turns + 1
+         turning(turns) = contact
+         key(turns) = ahead
+         call self%order(self%ahead)%first(ahead)
+      end do
+      if (turns == 0) return
+      ahead = min(ahead, last)
+      end_time = min(end_time, pose%time + self%hazard%turn_duration)
+      do turns = turns, 1, -1
+         call self%order(self%ahead)%put(turning(turns), key(turns))
+      end do
    end subroutine find_ahead
+
+   !> Whether the force of a contact changes its sign ahead.
+   pure function turns_ahead(self, contact)
+      class(thermal_contacts_type), intent(in) :: self
+      integer, intent(in) :: contact
+      logical :: turns_ahead
+
+      turns_ahead = force_sign(int(self%life(life_clock, contact))) * self%direction < 0.0_wp
+   end function turns_ahead
+
+   !> Whether it does, and its hazard is negligible there.
+   pure function may_turn_later(self, contact)
+      class(thermal_contacts_type), intent(in) :: self
+      integer, intent(in) :: contact
+      logical :: may_turn_later
+
+      may_turn_later = self%turns_ahead(contact) &
+         & .and. self%record(row_limit, contact) >= self%hazard%turn_limit
+   end function may_turn_later
 
    !> Update limits that have changed with the time: none here.
    subroutine update_bounds(self, pose)

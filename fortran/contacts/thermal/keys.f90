@@ -91,6 +91,7 @@ contains
          end if
          self%stretch = common%static_force / common%stiffness
          self%hazard%slope = common%stiffness / force
+         call self%hazard%limit_turns(self%stretch)
       end associate
       self%has_clocks = .true.
       self%clock%slope = force_sign * self%hazard%slope

@@ -8,14 +8,14 @@ module mesoslip_contacts_thermal_lists
    use mesoslip_interface_law, only: clocks, pose_type
    use mesoslip_numerics_kinds, only: i8, wp
    use mesoslip_numerics_random, only: uniform_pairs
-   use mesoslip_schedule, only: max_events, schedule_type
+   use mesoslip_schedule, only: max_events, max_turns, schedule_type
    implicit none
    private
 
    public :: thermal_lists_type
 
-   !> Minimum length of a schedule
-   integer, parameter :: min_length = 4
+   !> Minimum length of a schedule: with the contacts whose forces change their sign in a step
+   integer, parameter :: min_length = max_turns + 4
 
    !> Contacts that break by thermal activation, and write schedules with clocks.
    type, abstract, extends(thermal_keys_type) :: thermal_lists_type
@@ -103,7 +103,7 @@ contains
       schedule%break_stiffness(1) = self%parameters%stiffness
       schedule%break_drag(1) = drag_of(self%parameters, self%parameters%stiffness)
       call self%list_attaching(length, pose%direction, schedule)
-      schedule%is_over = .false.
+      schedule%is_over = .not. schedule%knows_stop()
    end subroutine plan_by_clocks
 
    !> List the next attachments in a direction of motion, and the births of contacts that break and
@@ -173,6 +173,8 @@ contains
          associate (contact => self%listed(event))
             schedule%break_origin(event) = self%record(row_origin, contact)
             schedule%break_turns(event) = int(self%life(life_clock, contact)) /= schedule%number
+            schedule%turns_later(event) = schedule%break_turns(event) &
+               & .and. self%record(row_limit, contact) >= self%hazard%turn_limit
             if (schedule%break_turns(event)) then
                schedule%turn_limit(event) = self%record(row_limit, contact)
                schedule%turn_left(event) = self%life(life_left, contact)

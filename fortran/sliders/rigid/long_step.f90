@@ -3,8 +3,8 @@ module mesoslip_sliders_rigid_long_step
    use mesoslip_interface_law, only: window_type
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_sliders_hazard_clock, only: advance_clocks
-   use mesoslip_sliders_motion_series, only: first_end, horner, integral, inverse, lever, &
-      & second_integral
+   use mesoslip_sliders_motion_series, only: first_end, horner, integral, inverse, lever, point_6, &
+      & second_integral, weight_6
    use mesoslip_sliders_rigid_state, only: arrive, long_terms, many_terms, motion_rates_type, &
       & pull, pull_unevenly, rigid_state_type, some_terms, system_type, uniform_gap
    implicit none
@@ -15,7 +15,7 @@ module mesoslip_sliders_rigid_long_step
    !> Lengths of middling, long and the longest steps in units of the fastest rate
    real(wp), parameter :: middling_step = 3.5e-2_wp, long_step = 8.0e-2_wp, max_step = 0.5_wp
 
-   !> Gauss-Legendre points and weights on [0, 1], for the losses in middling and long steps.
+   !> Gauss-Legendre points and weights on [0, 1], for the losses in middling steps.
    integer, parameter :: max_nodes = 6
    real(wp), parameter :: point_3(3) = [0.11270166537925831148_wp, 0.5_wp, &
       & 0.88729833462074168852_wp]
@@ -24,12 +24,6 @@ module mesoslip_sliders_rigid_long_step
       & 0.66999052179242813240_wp, 0.93056815579702628761_wp]
    real(wp), parameter :: weight_4(4) = [0.17392742256872692869_wp, 0.32607257743127307131_wp, &
       & 0.32607257743127307131_wp, 0.17392742256872692869_wp]
-   real(wp), parameter :: point_6(6) = [0.033765242898423986094_wp, 0.16939530676686774317_wp, &
-      & 0.38069040695840154568_wp, 0.61930959304159845432_wp, 0.83060469323313225683_wp, &
-      & 0.96623475710157601391_wp]
-   real(wp), parameter :: weight_6(6) = [0.085662246189585172520_wp, 0.18038078652406930378_wp, &
-      & 0.23395696728634552369_wp, 0.23395696728634552369_wp, 0.18038078652406930378_wp, &
-      & 0.085662246189585172520_wp]
 
 contains
 

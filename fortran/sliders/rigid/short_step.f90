@@ -6,7 +6,7 @@
 !> without iteration, p (1 - A_2 + (2 A_2**2 - A_3) + ...), exact to rounding or nearly so. Other
 !> steps, and those under a drive that accelerates, are in the module of long steps.
 module mesoslip_sliders_rigid_short_step
-   use mesoslip_interface_law, only: interface_law_type, window_type
+   use mesoslip_interface_law, only: clocks, hazard_clock_type, interface_law_type, window_type
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_sliders_hazard_clock, only: advance_clocks
    use mesoslip_sliders_motion_series, only: horner, integral, inverse
@@ -16,7 +16,8 @@ module mesoslip_sliders_rigid_short_step
    private
 
    public :: short_step_type, step_books_type
-   public :: try_short_step, books_of, derive, look_ahead, find_end, move, audit, keep_series
+   public :: try_short_step, books_of, derive, look_ahead, find_end, end_by_clocks, move, audit, &
+      & keep_series
 
    !> Maximum duration of a short step in units of the fastest rate
    real(wp), parameter :: max_step = 3.0e-3_wp
@@ -74,7 +75,6 @@ contains
 
       type(short_step_type) :: step
       type(rigid_motion_type) :: motion
-      logical :: is_due
 
       motion = self%motion()
       step%early = early
@@ -84,19 +84,29 @@ contains
       call find_end(system, self%damping, step, is_done)
       if (.not. is_done) return
       call keep_series(self, step)
-      if (self%has_clocks) then
-         call advance_clocks(self%clock, self%series, few_terms, step%duration, is_due)
-         if (is_due) then
-            step%crosses = .false.
-            step%end_time = self%time + step%duration
-         end if
-      end if
+      if (self%has_clocks) call end_by_clocks(self%clock, self%time, step)
       call move(self, system, self%law, step, motion)
       call self%take_motion(motion)
       self%start_acceleration = early%acceleration
       self%acceleration = step%acceleration
       call audit(self, books_of(step, self%law%drag), motion)
    end subroutine try_short_step
+
+   !> Advance clocks in a short step, and end it where one reaches its reading.
+   pure subroutine end_by_clocks(clock, time, step)
+      type(hazard_clock_type), intent(inout) :: clock(clocks)
+      !> Time at the start of the step [s]
+      real(wp), intent(in) :: time
+      !> The step, after find_end
+      type(short_step_type), intent(inout) :: step
+
+      logical :: is_due
+
+      call advance_clocks(clock, series_of(step), few_terms, step%duration, is_due)
+      if (.not. is_due) return
+      step%crosses = .false.
+      step%end_time = time + step%duration
+   end subroutine end_by_clocks
 
    !> Derivatives of acceleration and damper, each from the equation of motion, the damper put in.
    pure subroutine derive(system, damping, step)

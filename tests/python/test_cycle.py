@@ -17,7 +17,7 @@ from mesoslip.cycles.cycle import _cycle_of, _disturbed, master_equation
 from mesoslip.cycles.decay import Batch
 from mesoslip.cycles.disturbance import MAX_RETURN, after_disturbance, multipliers
 from mesoslip.cycles.section import Motion, Passage
-from mesoslip.cycles.settling import Settled, _Settling, settle
+from mesoslip.cycles.settling import BRIEF, Settled, _Settling, settle
 from mesoslip.simulation.archive import Archive
 from mesoslip.theory.contacts import contact_theory
 from mesoslip.theory.contacts.plain_sliding import SteadySliding
@@ -348,6 +348,9 @@ def test_a_cycle_that_settles_slowly_is_not_irregular(regular):
     found = settle(made, regular.state, regular.section, batches=[batch] * 2, is_stable=False)
     assert found.motion == "periodic"
     assert made.number > 40
+    brief = Made(regular.config)
+    assert settle(brief, regular.state, regular.section, is_brief=True).motion == "irregular"
+    assert brief.number == BRIEF
 
 
 def test_a_state_is_the_same_after_taking_it_apart(regular):

@@ -33,8 +33,8 @@ SUMMARY = {
     "spread": ("", "variation of periods, maxima and minima between passages, the largest one"),
     "slip_share": ("", "part of the time in slips"),
     "peak_velocity": ("m/s", "maximum of the velocity"),
-    "multiplier": ("", "factor of small changes from cycle to cycle, the leading modulus"),
-    "is_stable": ("", "whether period and peaks come back after a small change"),
+    "multiplier": ("", "factor of changes from cycle to cycle after a disturbance, the modulus"),
+    "is_stable": ("", "whether period and peaks return after a disturbance"),
     "smooth_stable": ("", "whether smooth sliding is linearly stable"),
 }
 

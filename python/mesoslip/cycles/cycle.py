@@ -38,6 +38,8 @@ LONG = 1e9
 # Resolution at which a motion settles first, to a tolerance, and maximum resolution for which it
 # does.
 COARSE, COARSE_TOLERANCE, MAX_FINE = 1.0, 3e-4, 0.5
+# Cycles in which a motion settles after that; otherwise it is followed from its own start.
+FEW = 24
 # Initial states, by name.
 STARTS = ("relaxed", "steady", "uniform")
 
@@ -151,7 +153,7 @@ def settled_cycle(
         batches: Sequence[Batch] = (),
         *,
         is_coarse: bool = False,
-        is_brief: bool = False,
+        max_passages: int | None = None,
     ) -> Settled:
         return settle(
             motion,
@@ -162,7 +164,7 @@ def settled_cycle(
             root=root,
             tolerance=max(tolerance, COARSE_TOLERANCE) if is_coarse else tolerance,
             max_cycles=max_cycles,
-            is_brief=is_brief,
+            max_passages=max_passages,
             progress=partial(report, is_coarse=is_coarse),
         )
 
@@ -175,9 +177,8 @@ def settled_cycle(
         with contextlib.suppress(RunError):
             coarse, back, coarse_cycles = _at_coarse(config, settled_at)
     if coarse is not None:
-        settled = settled_at(
-            motion, coarse.words, coarse.level, coarse.batches, is_brief=back is not None
-        )
+        few = None if back is None else FEW * coarse.multiple
+        settled = settled_at(motion, coarse.words, coarse.level, coarse.batches, max_passages=few)
         if back is not None and settled.motion != "periodic":
             settled = coarse = back = None
     if settled is None:

@@ -29,8 +29,6 @@ MAX_CHANGE = 10.0
 # Relative spread of period and peaks over a number of last passages below which a motion that has
 # not settled is periodic: steps of the solver, or a fine structure, may keep it from settling.
 MAX_SPREAD, SPREAD_PASSAGES = 2e-3, 24
-# Maximum number of passages of a brief iteration.
-BRIEF = 24
 # Passages in a later batch over those in the first one.
 BATCH_PART = 0.5
 # Ratio of successive changes below which they shrink; median of the changes in the last third of a
@@ -106,7 +104,7 @@ def settle(
     root: complex | None = None,
     tolerance: float = TOLERANCE,
     max_cycles: int = MAX_CYCLES,
-    is_brief: bool = False,
+    max_passages: int | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Settled:
     """Iterate a motion to its settled state, from a state with a section that may fit, or from the
@@ -116,10 +114,10 @@ def settle(
     error of period and peaks. After ``max_cycles`` passages a motion that has not settled is
     compared with itself later, and with the batches of a motion that led to the state and did not
     settle at a coarse resolution. ``progress`` is called with the passages over that number.
-    A brief iteration ends after a few passages, and does not extrapolate.
+    With ``max_passages`` nothing is extrapolated, and a motion that needs more is irregular.
     """
     start = 0.0 if words is None else time_of(words)
-    run = _Settling(motion, is_stable, root, tolerance, start, is_brief=is_brief)
+    run = _Settling(motion, is_stable, root, tolerance, start, max_passages)
     run.continue_after(batches, max_cycles)
     if words is None or level is None:
         words, trace = motion.advance(words, run.window)
@@ -147,11 +145,10 @@ class _Settling:
         root: complex | None,
         tolerance: float,
         start: float,
-        *,
-        is_brief: bool = False,
+        max_passages: int | None = None,
     ) -> None:
         self._motion, self._is_stable, self._tolerance = motion, is_stable, tolerance
-        self._start, self._is_brief = start, is_brief
+        self._start, self._max_passages = start, max_passages
         self._amplitudes = Amplitudes(motion.velocity, is_stable, root)
         self._force = motion.config.contacts.static_force
         self.window = LOADINGS * motion.loading_time + PERIODS * motion.setup_period
@@ -175,7 +172,6 @@ class _Settling:
         """Forget earlier passages, as the section or the state has been replaced."""
         self._rows: list[Array] = []
         self._amplitudes.restart()
-        self._vectors: list[Array] = []
         self._recent: list[Passage] = []
 
     def level_of(self, trace: Trace) -> Level | None:
@@ -196,7 +192,7 @@ class _Settling:
         it is not known."""
         self._restart()
         self._level = level
-        self._limit = self._limit or (BRIEF if self._is_brief else max_cycles)
+        self._limit = self._limit or self._max_passages or max_cycles
         while self._count < self._limit:
             passage = self._motion.next_passage(words, level)
             self._count += 1
@@ -220,9 +216,9 @@ class _Settling:
                 if not level.fits(force):
                     return words, Level.of(force), ""
                 return words, level, "periodic"
-            if not self._is_brief:
+            if not self._max_passages:
                 words = self._extrapolated(words, multiple)
-        if self._is_brief:
+        if self._max_passages:
             return words, level, "irregular"
         self._amplitudes.end_batch()
         if self._amplitudes.fall_between_batches():
@@ -271,7 +267,6 @@ class _Settling:
         self._recent = [*self._recent[1 - 2 * MAX_MULTIPLE :], passage]
         self._rows.append(np.array([passage.period, passage.peak, passage.low]))
         self._amplitudes.take(passage)
-        self._vectors.append(self._coordinates.of(passage.words))
 
     def _force_of(self, multiple: int) -> Array:
         force: Array = np.concatenate(
@@ -331,8 +326,7 @@ class _Settling:
 
     def _extrapolated(self, words: Words, multiple: int) -> Words:
         """The limit of the changes if they are a geometric series; otherwise the state itself."""
-        vectors = self._vectors
-        if len(vectors) < 3 * multiple + MIN_BETWEEN:
+        if len(self._rows) < 3 * multiple + MIN_BETWEEN:
             return words
         changes = self._differences(multiple)[::-multiple][:3]
         sizes = np.linalg.norm(changes, axis=1)
@@ -344,7 +338,8 @@ class _Settling:
             return words
         if abs(factor / (1 - factor)) * float(np.max(np.abs(changes[0]))) > MAX_JUMP:
             return words
-        step = factor / (1 - factor) * (vectors[-1] - vectors[-1 - multiple])
+        early, late = (self._coordinates.of(self._recent[one].words) for one in (-1 - multiple, -1))
+        step = factor / (1 - factor) * (late - early)
         self._extrapolations += 1
         words = self._coordinates.changed(words, step)
         self._restart()
@@ -356,11 +351,13 @@ class _Settling:
             multiple = 1
         elif error > self._tolerance:
             multiple, error = self._spread()
-        elif multiple > 1:
+        else:
             # Changes as small as the fine structure do not count as changes of the cycle.
-            change = float(np.max(np.abs(self._differences(1)[-multiple:])))
-            if change < MAX_SPREAD:
-                multiple, error = 1, change
+            for part in (one for one in range(1, multiple) if multiple % one == 0):
+                change = float(np.max(np.abs(self._differences(part)[-multiple:])))
+                if change < MAX_SPREAD:
+                    multiple, error = part, change
+                    break
         passages = self._recent[-multiple:] if motion == "periodic" else self._recent
         return Settled(
             motion,

@@ -39,7 +39,7 @@ LONG = 1e9
 # does.
 COARSE, COARSE_TOLERANCE, MAX_FINE = 1.0, 3e-4, 0.5
 # Cycles in which a motion settles after that; otherwise it is followed from its own start.
-FEW = 24
+FEW = 40
 # Initial states, by name.
 STARTS = ("relaxed", "steady", "uniform")
 
@@ -186,6 +186,8 @@ def settled_cycle(
     cycles = settled.cycles
     if back is None and (find_multipliers or begins_coarse):
         settled, back, cycles = _disturbed(motion, settled, settled_at, 10 * tolerance)
+    if settled.motion == "periodic":
+        settled = settled.shortest()
     cycle = _cycle_of(config, settled, back if settled.motion == "periodic" else None, is_stable)
     if coarse is not None:
         solver = f"{cycle.solver}, after {coarse_cycles} passages at resolution {COARSE:g}"

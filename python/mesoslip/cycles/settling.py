@@ -7,6 +7,7 @@ slow factor, the next state is the limit of their geometric series.
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -87,6 +88,18 @@ class Settled:
         changes = [np.ptp(periods) / periods[0], *(np.ptp([peaks, lows], axis=1) / amplitude)]
         limit = max(tolerance, SAME_ERRORS * (self.error + other.error))
         return float(max(changes)) < limit
+
+    def shortest(self) -> Settled:
+        """The cycle with the fewest passages that differ by no more than a fine structure."""
+        period, peak, low = self.rows[-1]
+        scale = np.array([period, peak - low, peak - low])
+        for part in (one for one in range(1, self.multiple) if self.multiple % one == 0):
+            changes = (self.rows[part:] - self.rows[:-part])[-self.multiple :] / scale
+            change = float(np.max(np.abs(changes)))
+            if change < MAX_SPREAD:
+                passages, error = self.passages[-part:], max(self.error, change)
+                return dataclasses.replace(self, multiple=part, passages=passages, error=error)
+        return self
 
 
 def _extremes(rows: Array) -> Array:
@@ -351,13 +364,6 @@ class _Settling:
             multiple = 1
         elif error > self._tolerance:
             multiple, error = self._spread()
-        else:
-            # Changes as small as the fine structure do not count as changes of the cycle.
-            for part in (one for one in range(1, multiple) if multiple % one == 0):
-                change = float(np.max(np.abs(self._differences(part)[-multiple:])))
-                if change < MAX_SPREAD:
-                    multiple, error = part, change
-                    break
         passages = self._recent[-multiple:] if motion == "periodic" else self._recent
         return Settled(
             motion,

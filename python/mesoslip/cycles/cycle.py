@@ -15,33 +15,31 @@ from mesoslip.configuration import arguments
 from mesoslip.configuration.config import Config
 from mesoslip.cycles.cycle_result import Cycle
 from mesoslip.cycles.decay import Batch
-from mesoslip.cycles.section import Level, Motion
+from mesoslip.cycles.disturbance import Return, after_disturbance
+from mesoslip.cycles.section import Level, Motion, time_of
 from mesoslip.cycles.settling import (
     MAX_CYCLES,
-    MAX_SPREAD,
     TOLERANCE,
     Settled,
-    multipliers,
     settle,
-    variation_after,
 )
 from mesoslip.errors import ConfigError, FileError, Problem, RunError
 from mesoslip.output.inputs import ConfigLike, OutputLike, as_config, open_output
 from mesoslip.simulation.kernel import Words
 from mesoslip.simulation.recorded_tables import TRACE_COLUMNS, structured
-from mesoslip.theory.steady_sliding import steady_sliding
+from mesoslip.theory.steady_sliding import decay_of_sliding
 
 # Maximum work for the stability of steady sliding, some seconds.
 MAX_WORK = 400_000
-# For multipliers: change of the state over N, maximum number of steps, and error of the modulus of
-# the leading one.
-CHANGE, MAX_STEPS, MULTIPLIER_ERROR = 3e-3, 6, 0.02
-# For the return after a small change: relative modulation of the density of contacts, and cycles.
-MODULATION, CYCLES_AFTER = 0.01, 20
+# Maximum number of disturbances from which a motion goes elsewhere.
+MAX_DISTURBANCES = 3
 # A duration without bound [s].
 LONG = 1e9
-# Resolution at which a motion settles first, and maximum resolution for which it does.
-COARSE, MAX_FINE = 1.0, 0.5
+# Resolution at which a motion settles first, to a tolerance, and maximum resolution for which it
+# does.
+COARSE, COARSE_TOLERANCE, MAX_FINE = 1.0, 3e-4, 0.5
+# Cycles in which a motion settles after that; otherwise it is followed from its own start.
+FEW = 40
 # Initial states, by name.
 STARTS = ("relaxed", "steady", "uniform")
 
@@ -81,7 +79,8 @@ def cycle(
         Number of passages after which a motion that has not settled is compared with itself later.
         It is irregular if its mean amplitude stays the same.
     find_multipliers
-        Whether to compute the leading multipliers.
+        Whether to disturb a cycle that continues from a start, so as to find its multipliers and
+        whether it returns. From the start of a run every cycle is disturbed.
     progress
         Called after each passage with its number over the maximum, 0 to 1.
 
@@ -135,23 +134,26 @@ def settled_cycle(
     From the start of a run it may settle at a coarse resolution first.
     """
     motion = Motion(config)
-    sliding = steady_sliding(config, MAX_WORK)
-    is_stable = None if sliding is None else sliding.is_stable
-    root = None if sliding is None else sliding.leading_root
-
+    is_stable, root = decay_of_sliding(config, MAX_WORK)
     begins_coarse = begins_coarse and config.run.resolution <= MAX_FINE
+    done = 0.0
 
     def report(part: float, *, is_coarse: bool) -> None:
-        if progress is not None:
-            progress(part / 2 + (0 if is_coarse else 0.5) if begins_coarse else part)
+        nonlocal done
+        if begins_coarse:
+            part = part / 2 + (0 if is_coarse else 0.5)
+        if progress is not None and part > done:
+            done = part
+            progress(part)
 
     def settled_at(
         motion: Motion,
         words: Words | None,
         level: Level | None,
-        batches: Sequence[Batch],
+        batches: Sequence[Batch] = (),
         *,
         is_coarse: bool = False,
+        max_passages: int | None = None,
     ) -> Settled:
         return settle(
             motion,
@@ -160,42 +162,80 @@ def settled_cycle(
             batches=batches,
             is_stable=is_stable,
             root=root,
-            tolerance=tolerance,
+            tolerance=max(tolerance, COARSE_TOLERANCE) if is_coarse else tolerance,
             max_cycles=max_cycles,
+            max_passages=max_passages,
             progress=partial(report, is_coarse=is_coarse),
         )
 
-    coarse, is_continued = None, words is not None
-    batches: Sequence[Batch] = ()
+    coarse: Settled | None = None
+    back: Return | None = None
+    settled: Settled | None = None
+    start = 0.0 if words is None else time_of(words)
+    is_continued, coarse_cycles = words is not None, 0
     if begins_coarse:
         with contextlib.suppress(RunError):
-            coarse = settled_at(Motion(_coarse(config)), None, None, (), is_coarse=True)
-        # Steps that are too long may let an oscillation decay.
-        if coarse is not None and coarse.motion == "smooth":
-            coarse = None
+            coarse, back, coarse_cycles = _at_coarse(config, settled_at)
     if coarse is not None:
-        words, level = coarse.words, coarse.level
-        batches = coarse.batches if coarse.motion == "irregular" else ()
-    settled = settled_at(motion, words, level, batches)
-    found: tuple[complex, ...] = ()
-    steps, variation = 0, math.nan
-    if find_multipliers and settled.motion == "periodic":
-        leading, steps = multipliers(
-            motion, settled, max_steps=MAX_STEPS, size=CHANGE, tolerance=MULTIPLIER_ERROR
-        )
-        found = tuple(leading)
-        if found and abs(found[0]) >= 1:
-            variation = variation_after(motion, settled, MODULATION, CYCLES_AFTER)
-            steps += CYCLES_AFTER
-    cycle = _cycle_of(config, settled, found, is_stable, steps, variation)
+        few = None if back is None else FEW * coarse.multiple
+        settled = settled_at(motion, coarse.words, coarse.level, coarse.batches, max_passages=few)
+        if back is not None and settled.motion != "periodic":
+            settled = coarse = back = None
+    if settled is None:
+        settled = settled_at(motion, words, level)
+    cycles = settled.cycles
+    if back is None and (find_multipliers or begins_coarse):
+        settled, back, cycles = _disturbed(motion, settled, settled_at, 10 * tolerance)
+    if settled.motion == "periodic":
+        settled = settled.shortest()
+    cycle = _cycle_of(config, settled, back if settled.motion == "periodic" else None, is_stable)
     if coarse is not None:
-        cycle = dataclasses.replace(
-            cycle,
-            coarse_cycles=coarse.cycles,
-            followed=cycle.followed + coarse.followed,
-            solver=f"{cycle.solver}, after {coarse.cycles} passages at resolution {COARSE:g}",
-        )
-    return dataclasses.replace(cycle, is_continued=is_continued)
+        solver = f"{cycle.solver}, after {coarse_cycles} passages at resolution {COARSE:g}"
+        cycle = dataclasses.replace(cycle, coarse_cycles=coarse_cycles, solver=solver)
+    followed = time_of(settled.words) - start
+    return dataclasses.replace(cycle, cycles=cycles, followed=followed, is_continued=is_continued)
+
+
+def _at_coarse(
+    config: Config, settled_at: Callable[..., Settled]
+) -> tuple[Settled | None, Return | None, int]:
+    """The motion settled at the coarse resolution, the return of a cycle, and the number of
+    passages; None where the motion at the configuration's own resolution may be another one.
+
+    Steps that are too long may let an oscillation decay. A cycle to which the motion does not
+    return after a disturbance, or at its own resolution does not settle soon, may not be that of
+    the start.
+    """
+    motion = Motion(_coarse(config))
+    settled = settled_at(motion, None, None, is_coarse=True)
+    if settled.motion == "irregular":
+        return settled, None, settled.cycles
+    back = after_disturbance(motion, settled) if settled.motion == "periodic" else None
+    if back is None or not back.returns:
+        return None, None, 0
+    settled = dataclasses.replace(settled, words=back.words, batches=())
+    return settled, back, settled.cycles + back.cycles * settled.multiple
+
+
+def _disturbed(
+    motion: Motion, settled: Settled, settled_at: Callable[..., Settled], tolerance: float
+) -> tuple[Settled, Return | None, int]:
+    """The motion that is reached after disturbances of a settled one, its return if it is a cycle,
+    and the number of passages."""
+    back, cycles = None, settled.cycles
+    for _ in range(MAX_DISTURBANCES):
+        if settled.motion != "periodic":
+            break
+        back = after_disturbance(motion, settled)
+        cycles += back.cycles * settled.multiple
+        if back.returns:
+            break
+        before, settled = settled, settled_at(motion, back.words, settled.level)
+        cycles += settled.cycles
+        if settled.is_like(before, tolerance):
+            back = back._replace(returns=True)
+            break
+    return settled, back, cycles
 
 
 def _coarse(config: Config) -> Config:
@@ -204,12 +244,7 @@ def _coarse(config: Config) -> Config:
 
 
 def _cycle_of(
-    config: Config,
-    settled: Settled,
-    found: tuple[complex, ...],
-    is_stable: bool | None,
-    steps: int,
-    variation: float,
+    config: Config, settled: Settled, back: Return | None, smooth_stable: bool | None
 ) -> Cycle:
     passages = settled.passages if settled.motion != "smooth" else []
     periodic = settled.motion == "periodic"
@@ -253,12 +288,12 @@ def _cycle_of(
         peak_velocity=max(velocities, default=math.nan),
         slips=slips if periodic else round(slips / max(1, len(passages))),
         slip_share=slip_time / math.fsum(one.period for one in passages) if passages else 0.0,
-        multipliers=found,
-        variation=variation,
-        smooth_stable=is_stable,
+        multipliers=() if back is None else back.multipliers,
+        is_stable=None if back is None else back.returns,
+        smooth_stable=smooth_stable,
         followed=settled.followed,
-        error=max(settled.error, variation) if variation < MAX_SPREAD else settled.error,
-        cycles=settled.cycles + steps * settled.multiple,
+        error=settled.error,
+        cycles=settled.cycles,
         solver="iteration from section to section"
         + (f", {extrapolations} extrapolations" if extrapolations else ""),
         state=settled.words,

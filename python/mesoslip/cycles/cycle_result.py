@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mesoslip.cycles.section import Level, Trace
-from mesoslip.cycles.settling import MAX_SPREAD, MIN_AMPLITUDE
+from mesoslip.cycles.settling import MIN_AMPLITUDE
 from mesoslip.output.provenance import program_attributes
 from mesoslip.output.variables import CYCLE, CYCLE_TRACE
 from mesoslip.quantities import with_unit
@@ -33,8 +33,8 @@ SUMMARY = {
     "spread": ("", "variation of periods, maxima and minima between passages, the largest one"),
     "slip_share": ("", "part of the time in slips"),
     "peak_velocity": ("m/s", "maximum of the velocity"),
-    "multiplier": ("", "factor of small changes from cycle to cycle, the leading modulus"),
-    "is_stable": ("", "whether period and peaks come back after a small change"),
+    "multiplier": ("", "factor of changes from cycle to cycle after a disturbance, the modulus"),
+    "is_stable": ("", "whether period and peaks return after a disturbance"),
     "smooth_stable": ("", "whether smooth sliding is linearly stable"),
 }
 
@@ -71,20 +71,20 @@ class Cycle:
     slip_share
         Part of the time that is spent in slips.
     multipliers
-        Leading multipliers of the cycle, by modulus: factors by which small changes of the state
-        grow from cycle to cycle. Empty if they were not computed.
-    variation
-        Relative variation of period and peaks after a small change, if the modulus of the leading
-        multiplier is 1 or more; otherwise NaN.
+        Leading multipliers of the cycle, by modulus: factors by which changes of the state grow
+        from cycle to cycle, as it returns after a disturbance; the modulus has an error of some
+        0.1. Empty if it was not disturbed.
+    is_stable
+        Whether period and peaks return after a disturbance of the contacts; None if it was not
+        disturbed.
     smooth_stable
         Whether smooth sliding is linearly stable; None without a theory.
     followed
         Simulated time [s].
     error
-        Estimated relative error of period and peaks by the iteration, or their variation if that is
-        larger; NaN if not periodic.
+        Estimated relative error of period and peaks by the iteration; NaN if not periodic.
     cycles
-        Number of computed passages, with those for the multipliers.
+        Number of computed passages, with those after disturbances.
     solver
         Method by which the cycle was found.
     state
@@ -108,7 +108,7 @@ class Cycle:
     slips: int
     slip_share: float
     multipliers: tuple[complex, ...]
-    variation: float
+    is_stable: bool | None
     smooth_stable: bool | None
     followed: float
     error: float
@@ -132,18 +132,6 @@ class Cycle:
     def exists(self) -> bool:
         """Whether the motion oscillates."""
         return self.motion != "smooth"
-
-    @property
-    def is_stable(self) -> bool | None:
-        """Whether period and peaks return to their values after a small change; None if the
-        multipliers are not known.
-
-        Small changes may grow in the fine structure of the distributions alone: the modulus of the
-        leading multiplier is then above 1, and period and peaks stay the same.
-        """
-        if not self.multipliers:
-            return None
-        return abs(self.multipliers[0]) < 1 or self.variation < MAX_SPREAD
 
     def trace(self) -> xr.Dataset:
         """Samples of one cycle over the time from the section, or of the last passages of an
@@ -244,11 +232,10 @@ class Cycle:
         else:
             passages = f" of {self.multiple} passages" if self.multiple > 1 else ""
             oscillation = f"the motion settles to a cycle{passages} with an amplitude of {percent}"
-        if self.is_stable and abs(self.multipliers[0]) >= 1:
-            oscillation += (
-                "; small changes grow in the fine structure of distributions alone: period and "
-                f"peaks vary by {100 * self.variation:.1g} %"
-            )
+            if self.coarse_cycles:
+                oscillation += f", after {self.coarse_cycles} passages with long steps"
+        if self.is_stable is False:
+            oscillation += "; a disturbance of the contacts leads away from it"
         both = "; both motions are possible" if self.smooth_stable else ""
         if both and self.motion == "irregular":
             both += ", the irregular one perhaps for a limited time"

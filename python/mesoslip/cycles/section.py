@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip.array_types import Array
-from mesoslip.simulation.archive import Archive, entries
+from mesoslip.simulation.archive import entries
 from mesoslip.simulation.kernel import Kernel, Words
 from mesoslip.simulation.kernel_setup import NEVER, KernelSetup
 from mesoslip.simulation.recorded_tables import SLIP_COLUMNS, TRACE_COLUMNS, structured
@@ -25,8 +25,11 @@ if TYPE_CHECKING:
 
 # Number of samples in a period of the pinned slider's ringing.
 SAMPLES_OF_RINGING = 32
-# Number of advances after which the trace is searched for a passage.
-CHUNK = 256
+# Maximum number of advances after which the trace is searched for a passage once the force has been
+# low, minimum number near one, and part of the advances to an extrapolated one before the search.
+CHUNK, MIN_CHUNK, APPROACH = 128, 16, 0.8
+# Number of advances between two drains without a search.
+MANY = 65536
 # Level of the section, and level below which the force must have been, relative to its range.
 LEVEL, RESET = 0.8, 0.5
 # Range of the level in which it is not chosen again.
@@ -122,6 +125,7 @@ class Motion:
         self.interval = ringing / SAMPLES_OF_RINGING
         force = contacts.static_force
         self.loading_time = force * (1 / spring + 2 / contacts.stiffness) / abs(self.velocity)
+        self._chunk = int(CHUNK / math.sqrt(config.run.resolution))
         self.setup_period = 2 * math.pi * math.sqrt(mass / spring)
         # Its contacts are copied, which is faster than making them again.
         self._template = Kernel()
@@ -146,16 +150,16 @@ class Motion:
         kernel = self.open(words, start + duration)
         rows = []
         while not kernel.ask().ending:
-            kernel.advance(CHUNK * CHUNK, ANY_WORK)
+            kernel.advance(MANY, ANY_WORK)
             rows.append(_taken(kernel)[0])
         return self._saved(kernel), structured(np.concatenate(rows), TRACE_COLUMNS)
 
     def _saved(self, kernel: Kernel) -> Words:
         """The state of a kernel, without the ending of its drive, so that it can be continued."""
-        archive = Archive(kernel.save())
-        archive.set_number("simulation", "ending", 0)
+        words = kernel.save()
         kernel.close()
-        return archive.words()
+        next(one for one in entries(words) if one.name == "ending").of(words)[:] = 0
+        return words
 
     def next_passage(self, words: Words, level: Level) -> Passage | None:
         """Advance from a state to the next passage through a level; None if the maximum time is
@@ -165,9 +169,9 @@ class Motion:
         pieces = [_Piece(words, start, [], [])]
         limit = start + MAX_LOADINGS * self.loading_time + MAX_PERIODS * self.setup_period
         search = _PassageSearch(level)
-        now = start
+        now, chunk = start, self._chunk
         while now < limit:
-            kernel.advance(CHUNK, ANY_WORK)
+            kernel.advance(chunk, ANY_WORK)
             trace, slips = _taken(kernel)
             pieces[-1].traces.append(trace)
             pieces[-1].slips.append(slips)
@@ -177,9 +181,11 @@ class Motion:
                 while pieces[-1].time >= found:
                     pieces.pop()
                 return self._cut(start, found, pieces)
-            now = kernel.ask().time
+            before, now = now, kernel.ask().time
             if search.has_been_low:
                 pieces.append(_Piece(kernel.save(), now, [], []))
+                # The last piece is repeated: near a passage pieces are short.
+                chunk = search.advances_left(trace, chunk / (now - before))
         kernel.close()
         return None
 
@@ -188,7 +194,7 @@ class Motion:
         last = pieces.pop()
         kernel = self.open(last.words, time)
         while not kernel.ask().ending:
-            kernel.advance(CHUNK, ANY_WORK)
+            kernel.advance(MANY, ANY_WORK)
         trace, slips = _taken(kernel)
         traces = [*chain.from_iterable(one.traces for one in pieces), trace]
         catalogues = [*chain.from_iterable(one.slips for one in pieces), slips]
@@ -242,6 +248,15 @@ class _PassageSearch:
         at = first + int(above[0])
         return self._between(rows[at - 1], rows[at])
 
+    def advances_left(self, rows: Array, rate: float) -> int:
+        """Number of advances before the next search, from the last samples and the advances per
+        time [1/s]."""
+        if len(rows) < 2:
+            return CHUNK
+        rise, duration = rows[-1, [FORCE, TIME]] - rows[0, [FORCE, TIME]]
+        left = APPROACH * (self._level.force - rows[-1, FORCE]) * duration * rate
+        return CHUNK if left >= CHUNK * rise else max(MIN_CHUNK, int(left / rise))
+
     def _between(self, early: Array, late: Array) -> float:
         """Time of the passage between two samples, by cubic interpolation of the force."""
         duration = late[TIME] - early[TIME]
@@ -277,4 +292,4 @@ def mass_of(config: Config) -> float:
 
 def time_of(words: Words) -> float:
     """Time of a state [s]."""
-    return next(float(one.values[0]) for one in entries(words) if one.name == "time")
+    return next(float(one.of(words)[0]) for one in entries(words) if one.name == "time")

@@ -7,18 +7,17 @@ slow factor, the next state is the limit of their geometric series.
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mesoslip.array_types import Array
 from mesoslip.cycles.coordinates import Coordinates
 from mesoslip.cycles.decay import Amplitudes, Batch
 from mesoslip.cycles.section import Level, Motion, Passage, Trace, time_of
-from mesoslip.errors import RunError
 from mesoslip.simulation.kernel import Words
 
 # Maximum number of passages in a settled cycle.
@@ -48,6 +47,8 @@ MAX_WINDOWS = 40
 # Changes are extrapolated if they shrink by a slow factor with little variation, some cycles after
 # the last extrapolation, and by a limited jump of period, peak and low (over period and amplitude).
 SLOW, MAX_VARIATION, MIN_BETWEEN, MAX_JUMP = 0.6, 0.15, 4, 0.3
+# Maximum difference of equal cycles over the sum of their errors.
+SAME_ERRORS = 3.0
 # Final amplitude over the present one below which an oscillation decays to smooth sliding.
 DECAYED = 0.1
 
@@ -70,13 +71,40 @@ class Settled:
     extrapolations: int
     error: float
     """Estimated relative error of period and peaks."""
-    changes: list[Array]
-    """Differences of the vectors of the last states, over a cycle of ``multiple`` passages."""
     rows: Array
     """Duration [s], maximum and minimum of the spring force [N] of all passages of this section,
     shape (passages, 3)."""
     batches: Sequence[Batch] = ()
     """Mean amplitudes of earlier passages, if it did not settle in them."""
+
+    def is_like(self, other: Settled, tolerance: float) -> bool:
+        """Whether both are one cycle, within their errors and a tolerance."""
+        if not self.motion == other.motion == "periodic" or self.multiple != other.multiple:
+            return False
+        periods, peaks, lows = np.transpose(
+            [_extremes(one.rows[-one.multiple :]) for one in (self, other)]
+        )
+        amplitude = float(peaks[0] - lows[0])
+        changes = [np.ptp(periods) / periods[0], *(np.ptp([peaks, lows], axis=1) / amplitude)]
+        limit = max(tolerance, SAME_ERRORS * (self.error + other.error))
+        return float(max(changes)) < limit
+
+    def shortest(self) -> Settled:
+        """The cycle with the fewest passages that differ by no more than a fine structure."""
+        period, peak, low = self.rows[-1]
+        scale = np.array([period, peak - low, peak - low])
+        for part in (one for one in range(1, self.multiple) if self.multiple % one == 0):
+            changes = (self.rows[part:] - self.rows[:-part])[-self.multiple :] / scale
+            change = float(np.max(np.abs(changes)))
+            if change < MAX_SPREAD:
+                passages, error = self.passages[-part:], max(self.error, change)
+                return dataclasses.replace(self, multiple=part, passages=passages, error=error)
+        return self
+
+
+def _extremes(rows: Array) -> Array:
+    """Period, maximum and minimum of a cycle."""
+    return np.array([np.sum(rows[:, 0]), np.max(rows[:, 1]), np.min(rows[:, 2])])
 
 
 def settle(
@@ -89,6 +117,7 @@ def settle(
     root: complex | None = None,
     tolerance: float = TOLERANCE,
     max_cycles: int = MAX_CYCLES,
+    max_passages: int | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Settled:
     """Iterate a motion to its settled state, from a state with a section that may fit, or from the
@@ -98,8 +127,10 @@ def settle(
     error of period and peaks. After ``max_cycles`` passages a motion that has not settled is
     compared with itself later, and with the batches of a motion that led to the state and did not
     settle at a coarse resolution. ``progress`` is called with the passages over that number.
+    With ``max_passages`` nothing is extrapolated, and a motion that needs more is irregular.
     """
-    run = _Settling(motion, is_stable, root, tolerance, 0.0 if words is None else time_of(words))
+    start = 0.0 if words is None else time_of(words)
+    run = _Settling(motion, is_stable, root, tolerance, start, max_passages)
     run.continue_after(batches, max_cycles)
     if words is None or level is None:
         words, trace = motion.advance(words, run.window)
@@ -127,9 +158,10 @@ class _Settling:
         root: complex | None,
         tolerance: float,
         start: float,
+        max_passages: int | None = None,
     ) -> None:
         self._motion, self._is_stable, self._tolerance = motion, is_stable, tolerance
-        self._start = start
+        self._start, self._max_passages = start, max_passages
         self._amplitudes = Amplitudes(motion.velocity, is_stable, root)
         self._force = motion.config.contacts.static_force
         self.window = LOADINGS * motion.loading_time + PERIODS * motion.setup_period
@@ -153,7 +185,6 @@ class _Settling:
         """Forget earlier passages, as the section or the state has been replaced."""
         self._rows: list[Array] = []
         self._amplitudes.restart()
-        self._vectors: list[Array] = []
         self._recent: list[Passage] = []
 
     def level_of(self, trace: Trace) -> Level | None:
@@ -174,7 +205,7 @@ class _Settling:
         it is not known."""
         self._restart()
         self._level = level
-        self._limit = self._limit or max_cycles
+        self._limit = self._limit or self._max_passages or max_cycles
         while self._count < self._limit:
             passage = self._motion.next_passage(words, level)
             self._count += 1
@@ -198,7 +229,10 @@ class _Settling:
                 if not level.fits(force):
                     return words, Level.of(force), ""
                 return words, level, "periodic"
-            words = self._extrapolated(words, multiple)
+            if not self._max_passages:
+                words = self._extrapolated(words, multiple)
+        if self._max_passages:
+            return words, level, "irregular"
         self._amplitudes.end_batch()
         if self._amplitudes.fall_between_batches():
             return words, None, "smooth"
@@ -246,7 +280,6 @@ class _Settling:
         self._recent = [*self._recent[1 - 2 * MAX_MULTIPLE :], passage]
         self._rows.append(np.array([passage.period, passage.peak, passage.low]))
         self._amplitudes.take(passage)
-        self._vectors.append(self._coordinates.of(passage.words))
 
     def _force_of(self, multiple: int) -> Array:
         force: Array = np.concatenate(
@@ -306,8 +339,7 @@ class _Settling:
 
     def _extrapolated(self, words: Words, multiple: int) -> Words:
         """The limit of the changes if they are a geometric series; otherwise the state itself."""
-        vectors = self._vectors
-        if len(vectors) < 3 * multiple + MIN_BETWEEN:
+        if len(self._rows) < 3 * multiple + MIN_BETWEEN:
             return words
         changes = self._differences(multiple)[::-multiple][:3]
         sizes = np.linalg.norm(changes, axis=1)
@@ -319,7 +351,8 @@ class _Settling:
             return words
         if abs(factor / (1 - factor)) * float(np.max(np.abs(changes[0]))) > MAX_JUMP:
             return words
-        step = factor / (1 - factor) * (vectors[-1] - vectors[-1 - multiple])
+        early, late = (self._coordinates.of(self._recent[one].words) for one in (-1 - multiple, -1))
+        step = factor / (1 - factor) * (late - early)
         self._extrapolations += 1
         words = self._coordinates.changed(words, step)
         self._restart()
@@ -331,15 +364,6 @@ class _Settling:
             multiple = 1
         elif error > self._tolerance:
             multiple, error = self._spread()
-        elif multiple > 1:
-            # Changes as small as the fine structure do not count as changes of the cycle.
-            change = float(np.max(np.abs(self._differences(1)[-multiple:])))
-            if change < MAX_SPREAD:
-                multiple, error = 1, change
-        changes = [
-            late - early
-            for late, early in zip(self._vectors[multiple:], self._vectors[:-multiple], strict=True)
-        ]
         passages = self._recent[-multiple:] if motion == "periodic" else self._recent
         return Settled(
             motion,
@@ -351,89 +375,6 @@ class _Settling:
             self._count,
             self._extrapolations,
             error if motion == "periodic" else math.nan,
-            changes[-4 * MAX_MULTIPLE :],
             np.array(self._rows).reshape(-1, 3),
             self._amplitudes.batches,
         )
-
-
-def variation_after(motion: Motion, settled: Settled, part: float, cycles: int) -> float:
-    """Maximum relative change of period and peaks in the second half of the cycles after a
-    modulation of the density of pinned contacts over their stretch."""
-    assert settled.level is not None
-    coordinates = Coordinates(motion.config, motion.velocity)
-    words = coordinates.changed(settled.words, coordinates.modulation(settled.words, part))
-    found = []
-    for _ in range(cycles):
-        passages = []
-        for _ in range(settled.multiple):
-            passage = motion.next_passage(words, settled.level)
-            if passage is None:
-                return math.inf
-            words = passage.words
-            passages.append(passage)
-        found.append(_period_and_peak(passages))
-    late, before = np.array(found[cycles // 2 :]), np.array(_period_and_peak(settled.passages))
-    return float(np.max(np.abs(late / before - 1)))
-
-
-def _period_and_peak(passages: Sequence[Passage]) -> tuple[float, float]:
-    return math.fsum(one.period for one in passages), max(one.peak for one in passages)
-
-
-def multipliers(
-    motion: Motion, settled: Settled, *, max_steps: int, size: float, tolerance: float
-) -> tuple[Sequence[complex], int]:
-    """Leading multipliers of a settled cycle by modulus, and the number of computed cycles, by
-    Arnoldi's method on differences of the map.
-
-    A step computes a cycle with a change of the state, at most ``size`` in each number of the
-    vector; the tolerance is the change of the leading modulus in the last step.
-    """
-    coordinates = Coordinates(motion.config, motion.velocity)
-    if not settled.changes or settled.level is None:
-        return (), 0
-
-    def image(words: Words) -> Array:
-        for _ in range(settled.multiple):
-            assert settled.level is not None
-            passage = motion.next_passage(words, settled.level)
-            if passage is None:
-                raise RunError("a cycle near the settled one does not return to its section")
-            words = passage.words
-        return coordinates.of(words)
-
-    start, end = coordinates.of(settled.words), image(settled.words)
-    # The latest changes above rounding errors have the leading modes.
-    weigh = coordinates.weigh
-    sizes = [float(np.max(np.abs(one))) for one in settled.changes]
-    chosen = next(
-        (one for one, big in zip(settled.changes[::-1], sizes[::-1], strict=True) if big > size),
-        settled.changes[0],
-    )
-    basis = [chosen / np.linalg.norm(weigh(chosen))]
-    matrix = np.zeros((max_steps + 1, max_steps))
-    found: NDArray[np.complex128] = np.zeros(0, dtype=complex)
-    for step in range(max_steps):
-        part = size / float(np.max(np.abs(basis[-1])))
-        changed = coordinates.changed(settled.words, part * basis[-1])
-        applied = (coordinates.of(changed) - start) / part
-        # The basis is the applied change, which is 0 in empty cells.
-        scale = float(np.linalg.norm(weigh(applied)))
-        basis[-1] = applied / scale
-        column = (image(changed) - end) / part / scale
-        for _ in range(2):
-            for row, vector in enumerate(basis):
-                overlap = float(weigh(vector) @ weigh(column))
-                matrix[row, step] += overlap
-                column = column - overlap * vector
-        before = found
-        found = np.linalg.eigvals(matrix[: step + 1, : step + 1]).astype(complex)
-        found = found[np.argsort(-np.abs(found))]
-        rest = float(np.linalg.norm(weigh(column)))
-        matrix[step + 1, step] = rest
-        close = len(before) > 1 and abs(abs(found[0]) - abs(before[0])) < tolerance
-        if close or not rest > 0 or step == max_steps - 1:
-            break
-        basis.append(column / rest)
-    return tuple(complex(one) for one in found), step + 2

@@ -29,11 +29,8 @@ def sliding_of(config: Config, velocity: float | None = None) -> LinearStability
 def steady_sliding(config: Config, max_work: int) -> LinearStability | None:
     """Steady sliding of a configuration, cached; None without a theory, or if it takes more
     work."""
-    try:
-        sliding = sliding_of(config)
-    except ConfigError:
-        return None
-    if sliding.work > max_work:
+    sliding = _affordable(config, max_work)
+    if sliding is None:
         return None
     try:
         # The summary needs both, and caches them. Extreme parameters may overflow.
@@ -43,6 +40,28 @@ def steady_sliding(config: Config, max_work: int) -> LinearStability | None:
     except RunError:
         return None
     return sliding
+
+
+@lru_cache(maxsize=16)
+def _affordable(config: Config, max_work: int) -> LinearStability | None:
+    try:
+        sliding = sliding_of(config)
+    except ConfigError:
+        return None
+    return sliding if sliding.work <= max_work else None
+
+
+def decay_of_sliding(config: Config, max_work: int) -> tuple[bool | None, complex | None]:
+    """Whether steady sliding is stable, and its leading root [1/s] if it is; None where they are
+    not known, as in `steady_sliding`, which computes more."""
+    sliding = _affordable(config, max_work)
+    if sliding is None:
+        return None, None
+    try:
+        with np.errstate(all="ignore"):
+            return sliding.is_stable, sliding.leading_root if sliding.is_stable else None
+    except RunError:
+        return None, None
 
 
 def stability_boundary(

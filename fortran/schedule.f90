@@ -128,8 +128,8 @@ module mesoslip_schedule
       procedure, non_overridable :: pass
       procedure, non_overridable, private :: break_due, attach_due, fit_to_track, &
          & insert_attachment, cut_breaks
-      !> Let sites touch or separate: by dispatch, as a copy of it in pass would keep that from being
-      !> inlined into the loops of sliders
+      !> Let sites touch or separate. By dispatch, because a copy of it in pass would keep that from
+      !> being inlined into the loops of sliders.
       procedure, private :: follow_load
       !> Whether the end of the next step is known
       procedure, non_overridable :: knows_stop

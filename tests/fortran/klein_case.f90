@@ -52,6 +52,8 @@ contains
       ! Scattered delays, and forces with which contacts attach.
       values = [real(count, wp), 18.0e-6_wp / count, 2000.0_wp / count, 6.7e-5_wp / count, delay, &
          & 0.1_wp, 1.0_wp, width, merge(0.05_wp, 0.0_wp, index(contacts, "scattered") > 0)]
+      ! Without a back force contacts of any threshold may touch.
+      if (contacts == "loaded") values(6) = 0.0_wp
       ! Where it is cold, forces change their sign without a step of their own.
       bell = [0.0_wp, 0.0_wp, 1.0e3_wp, merge(0.01_wp, 0.05_wp, index(contacts, "cold") > 0) &
          & * 18.0e-6_wp / count]

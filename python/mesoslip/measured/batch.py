@@ -39,6 +39,8 @@ COLUMNS = {
     "mean_waiting_time": "s",
     "message": "-",
 }
+# Start of a table.
+HEADER = b"file [-],output [-],"
 Row = dict[str, Any]
 
 
@@ -71,6 +73,14 @@ def pieces_of(
 
 def output_name(file: Path) -> str:
     return f"{Path(file.stem).stem if file.suffix in PACKED else file.stem}.nc"
+
+
+def may_be_replaced(table: Path) -> bool:
+    """Whether a table may take a name: no measurement has it, such as the first of all files."""
+    if not table.exists() or table.suffix.lower() in {".md", ".tex"}:
+        return True
+    with table.open("rb") as file:
+        return file.readline(len(HEADER)) in {b"", HEADER}
 
 
 def read_pieces(

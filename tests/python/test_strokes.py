@@ -385,6 +385,16 @@ def test_revolutions_are_drawn_one_by_one() -> None:
         assert (steps[np.isfinite(steps)] >= 0).all()
 
 
+def test_maxima_are_drawn_where_no_mean_is_known(tmp_path) -> None:  # type: ignore[no-untyped-def]
+    """In partial slip without a load point."""
+    found, record = strokes_of_made(1151, tmp_path)
+    tree = record_tree(record.time, record.force)
+    axes = mesoslip.plot(tree, view="strokes").axes[1]
+    assert axes.get_ylabel() == "maximum friction (mN)"
+    drawn = sum(len(one.get_children()[0].get_xdata()) for one in axes.containers)
+    assert drawn == len(found.columns["strokes"]["max_friction"])
+
+
 def test_colours_of_a_map_are_those_of_sliding() -> None:
     """A reversal of a tenth of the stroke, beside friction that varies by 4 %."""
     x = np.sin(2 * np.pi * phases())

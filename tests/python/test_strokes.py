@@ -575,6 +575,13 @@ def test_friction_of_partial_slip_without_a_load_point_has_a_lower_limit(number,
     assert found.to_json()["min_friction"]["mean"] == limit.value
 
 
+@pytest.mark.parametrize("number", [1001, 1226])
+def test_a_fall_or_two_among_thousands_of_samples_are_noise(number, tmp_path):
+    """Many minimum falls are tried, and the ratios of few rises and falls are not normal."""
+    made(number).write(tmp_path / "a.csv")
+    assert mesoslip.read_trace(tmp_path / "a.csv")["slips"].sizes["slip"] == 0
+
+
 def test_the_sign_of_a_force_in_partial_slip_is_by_the_energy(tmp_path):
     """Nearly elastic strokes, whose mean force along the motion is hardly positive."""
     found, record = strokes_of_made(1018, tmp_path)

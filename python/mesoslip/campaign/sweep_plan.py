@@ -180,10 +180,8 @@ class Plan:
             raise ConfigError([Problem(self._source, "sweep", message)])
 
     def chains(self) -> Iterator[tuple[int, ...]]:
-        """The combinations in chains, each run of which starts from the end of the one before.
-
-        Without `sweep.continue` each combination is a chain of its own.
-        """
+        """The combinations in chains, of which each run starts from the end of the one before;
+        without `sweep.continue` each is a chain of its own."""
         if self.sweep.continue_ is None:
             return ((one,) for one in range(math.prod(self.shape)))
         return chained(self.axes, self.sweep)

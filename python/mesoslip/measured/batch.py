@@ -90,8 +90,8 @@ def read_pieces(
     executor: ExecutorLike = None,
     progress: Callable[[float], None] = lambda _: None,
 ) -> list[Row]:
-    """Read files and write their outputs; the rows of those before a stop, of a file that cannot be
-    read with the message."""
+    """Read files and write their outputs; returns the rows of those read before a stop, with a
+    message for a file that cannot be read."""
     pool = as_executor(executor, ThreadsThenProcesses)
     rows = []
     with closing(completed(pool, read_piece, pieces, stop, in_order=True)) as done:

@@ -117,10 +117,13 @@ ROW = {
     **{"kind": "interface", "blocks": 3, "mass": 1.47e-3, "length": 1e-2, "bar_stiffness": 2000.0},
     **{"neighbour_damping": 500.0, "stiffness": 97.0, "damping_ratio": 0.2},
 }
-# The same of contacts one by one.
-INDIVIDUAL: dict[str, dict[str, Any]] = {
+# Of one engine alone: contacts one by one, and populations of narrow thresholds, in long steps.
+SINGLE: dict[str, dict[str, Any]] = {
     "eq-interface": {"slider": ROW},
     "eq-rigid-keep": SLIDERS["rigid"] | {"contacts__renewal": "keep"},
+    "me-rigid-narrow": ENGINES["me"]
+    | SLIDERS["rigid"]
+    | {"contacts__threshold__relative_width": 0.01},
 }
 
 Case = Callable[[], xr.DataTree]
@@ -154,7 +157,7 @@ CASES: dict[str, Case] = (
         f"{engine}-{name}": _run(**(_without(COMMON, changes) | ENGINES[engine] | changes))
         for engine, (name, changes) in itertools.product(ENGINES, FURTHER.items())
     }
-    | {name: _run(**(_without(COMMON, changes) | changes)) for name, changes in INDIVIDUAL.items()}
+    | {name: _run(**(_without(COMMON, changes) | changes)) for name, changes in SINGLE.items()}
     | {
         f"{function.__name__}-{coupling}": _theory(function, contacts__coupling=coupling)
         for function in (mesoslip.curve, mesoslip.onset)

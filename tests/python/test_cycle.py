@@ -179,7 +179,7 @@ class Scaled(Motion):
 @pytest.mark.parametrize(("part", "factor"), [(0.01, 0.6), (0.01, -0.7), (1e-4, 1.2), (0.01, 1.0)])
 def test_a_cycle_is_stable_if_it_returns(regular, part, factor):
     rows = np.array([[regular.period, regular.peak_force, regular.low_force]])
-    settled = Settled("periodic", 1, [], regular.section, regular.state, 0.0, 9, 0, 1e-6, rows)
+    settled = Settled("periodic", 1, [], regular.section, regular.state, 0.0, 9, 1e-6, rows)
     back = after_disturbance(Scaled(regular, part, factor), settled)
     assert back.returns == (abs(factor) < 1)
     assert back.cycles == MAX_RETURN or back.returns
@@ -191,9 +191,7 @@ def test_a_motion_that_does_not_return_settles_again(regular):
 
     def settled(period, multiple=1):
         rows = np.tile([period, 2.0, 1.0], (multiple, 1))
-        return Settled(
-            "periodic", multiple, [], regular.section, regular.state, 0.0, 9, 0, 1e-6, rows
-        )
+        return Settled("periodic", multiple, [], regular.section, regular.state, 0.0, 9, 1e-6, rows)
 
     never = Scaled(regular, 0.01, 1.0)
     # The same cycle again.
@@ -212,7 +210,7 @@ def test_the_spread_of_an_irregular_motion_has_its_periods():
     durations = np.where(np.arange(80) % 5, 1.0, 1.5)
     rows = np.stack([durations, np.full(80, 2.0), np.full(80, 1.0)], axis=1)
     words = np.empty(0, dtype=np.int64)
-    settled = Settled("irregular", 1, [], None, words, 80.0, 80, 0, math.nan, rows)
+    settled = Settled("irregular", 1, [], None, words, 80.0, 80, math.nan, rows)
     found = _cycle_of(configuration(), settled, None, None)
     assert found.spread == pytest.approx(np.std(durations[20:]) / np.mean(durations[20:]))
 
@@ -223,7 +221,7 @@ def test_smooth_sliding_and_irregular_motion_are_told_apart():
     assert smooth.smooth_stable
     assert smooth.amplitude == 0
     assert "smooth sliding" in smooth.verdict
-    irregular = mesoslip.cycle(configuration("slider.damping_ratio=0.2", LONG_STEPS), max_cycles=14)
+    irregular = mesoslip.cycle(configuration("slider.damping_ratio=0.2", LONG_STEPS))
     assert irregular.motion == "irregular"
     assert irregular.spread > 0.02
     assert sum(irregular.durations) < irregular.followed

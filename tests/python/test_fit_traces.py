@@ -410,10 +410,12 @@ def test_several_traces_share_their_free_parameters(two_traces):
         "slider.stiffness is that of spring97, and 1.546 times that in spring150, as declared"
         in posterior.attrs["notes"]
     )
+    # Traces with one and two slips say little of the delay.
+    ratios = {"contacts.static_force": 1.2, "contacts.delay": 2.5, "slider.stiffness": 1.3}
     for key, value in (TRUTH | {"slider.stiffness": 97.0}).items():
         low, high = np.percentile(posterior["posterior"][key], [0.5, 99.5])
         assert low < value < high
-        assert high < 1.7 * low
+        assert high < ratios[key] * low
     assert posterior.attrs["agreement_probability"] > checks.REJECTED
     groups = {str(one) for one in posterior["summaries"]["group"].values}
     assert {"slips of spring97", "slips of spring150"} <= groups

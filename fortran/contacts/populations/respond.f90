@@ -68,8 +68,8 @@ contains
    end subroutine detach_tried
 
    !> Half the change of the rate of breaks in a motion over the mean rate, from -1 to 1. Contacts
-   !> that reach their thresholds break as fast as the slider moves, and the work that their breaks
-   !> save has where in the motion they break on average; by activation they break evenly in time.
+   !> that reach their thresholds break as fast as the slider moves, in long steps by where they
+   !> break on average, as the work says that their breaks save; by activation evenly in time.
    pure function growth_of_breaks(self, before, after) result(growth)
       class(population_state_type), intent(in) :: self
       type(pose_type), intent(in) :: before, after
@@ -79,7 +79,8 @@ contains
       if (self%pinned%is_thermal) return
       associate (twice_mean => before%velocity + after%velocity, trial => self%pinned%trial)
          if (trial%direction * twice_mean > 0.0_wp) then
-            growth = (after%velocity - before%velocity) / twice_mean + trial%growth()
+            growth = (after%velocity - before%velocity) / twice_mean
+            if (self%pinned%adapts) growth = growth + trial%growth()
             growth = max(-1.0_wp, min(1.0_wp, growth))
          end if
       end associate
@@ -202,7 +203,8 @@ contains
       real(wp), allocatable :: held(:)
 
       allocate (held(self%bins()), source=0.0_wp)
-      call self%detached%take_due(before, after, births, moment, square, when, held)
+      call self%detached%take_due(before, after, self%pinned%adapts, births, moment, square, &
+         & when, held)
       if (.not. births > 0.0_wp) return
       if (size(held) > 0) self%pinned%newborn_mix = held / births
 

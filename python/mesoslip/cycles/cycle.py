@@ -272,7 +272,6 @@ def _cycle_of(
     traces = [structured(np.empty((0, len(TRACE_COLUMNS))), TRACE_COLUMNS)]
     traces = [one.trace for one in passages] or traces
     velocities = (float(np.max(np.abs(one.trace["velocity"]))) for one in passages)
-    extrapolations = settled.extrapolations
     return Cycle(
         config=config,
         motion=settled.motion,
@@ -294,8 +293,7 @@ def _cycle_of(
         followed=settled.followed,
         error=settled.error,
         cycles=settled.cycles,
-        solver="iteration from section to section"
-        + (f", {extrapolations} extrapolations" if extrapolations else ""),
+        solver="iteration from section to section",
         state=settled.words,
         section=settled.level,
         _trace=np.concatenate(traces),

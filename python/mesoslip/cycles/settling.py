@@ -1,8 +1,7 @@
 """Iteration of a motion of the master equation to its settled cycle.
 
 The map from section to section is iterated. Where it converges, it usually does so within about ten
-cycles, as contacts forget their history within a few lives. Where the last changes shrink by one
-slow factor, the next state is the limit of their geometric series.
+cycles, as contacts forget their history within a few lives.
 """
 
 from __future__ import annotations
@@ -15,7 +14,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from mesoslip.array_types import Array
-from mesoslip.cycles.coordinates import Coordinates
 from mesoslip.cycles.decay import Amplitudes, Batch
 from mesoslip.cycles.section import Level, Motion, Passage, Trace, time_of
 from mesoslip.simulation.kernel import Words
@@ -44,9 +42,6 @@ MIN_AMPLITUDE = 1e-3
 LOADINGS, PERIODS = 2.0, 10.0
 # Maximum number of such times without an oscillation.
 MAX_WINDOWS = 40
-# Changes are extrapolated if they shrink by a slow factor with little variation, some cycles after
-# the last extrapolation, and by a limited jump of period, peak and low (over period and amplitude).
-SLOW, MAX_VARIATION, MIN_BETWEEN, MAX_JUMP = 0.6, 0.15, 4, 0.3
 # Maximum difference of equal cycles over the sum of their errors.
 SAME_ERRORS = 3.0
 # Final amplitude over the present one below which an oscillation decays to smooth sliding.
@@ -68,7 +63,6 @@ class Settled:
     """Simulated time [s]."""
     cycles: int
     """Number of computed passages."""
-    extrapolations: int
     error: float
     """Estimated relative error of period and peaks."""
     rows: Array
@@ -127,7 +121,7 @@ def settle(
     error of period and peaks. After ``max_cycles`` passages a motion that has not settled is
     compared with itself later, and with the batches of a motion that led to the state and did not
     settle at a coarse resolution. ``progress`` is called with the passages over that number.
-    With ``max_passages`` nothing is extrapolated, and a motion that needs more is irregular.
+    With ``max_passages`` a motion that needs more is irregular.
     """
     start = 0.0 if words is None else time_of(words)
     run = _Settling(motion, is_stable, root, tolerance, start, max_passages)
@@ -165,8 +159,7 @@ class _Settling:
         self._amplitudes = Amplitudes(motion.velocity, is_stable, root)
         self._force = motion.config.contacts.static_force
         self.window = LOADINGS * motion.loading_time + PERIODS * motion.setup_period
-        self._coordinates = Coordinates(motion.config, motion.velocity)
-        self._count = self._extrapolations = 0
+        self._count = 0
         self._limit = 0
         self._level: Level | None = None
         self._restart()
@@ -229,8 +222,6 @@ class _Settling:
                 if not level.fits(force):
                     return words, Level.of(force), ""
                 return words, level, "periodic"
-            if not self._max_passages:
-                words = self._extrapolated(words, multiple)
         if self._max_passages:
             return words, level, "irregular"
         self._amplitudes.end_batch()
@@ -337,27 +328,6 @@ class _Settling:
         limit = sizes[-1] + falls[-1] * float(np.mean(factor)) / (1 - float(np.mean(factor)))
         return bool(np.all(factor < 1) and limit < DECAYED * sizes[-1])
 
-    def _extrapolated(self, words: Words, multiple: int) -> Words:
-        """The limit of the changes if they are a geometric series; otherwise the state itself."""
-        if len(self._rows) < 3 * multiple + MIN_BETWEEN:
-            return words
-        changes = self._differences(multiple)[::-multiple][:3]
-        sizes = np.linalg.norm(changes, axis=1)
-        if not sizes[0] > 0 or not sizes[1] > 0 or not sizes[2] > 0:
-            return words
-        factors = np.sum(changes[:-1] * changes[1:], axis=1) / sizes[1:] ** 2
-        factor = float(np.mean(factors))
-        if not SLOW < abs(factor) < 1 or float(np.ptp(factors)) > MAX_VARIATION * (1 - abs(factor)):
-            return words
-        if abs(factor / (1 - factor)) * float(np.max(np.abs(changes[0]))) > MAX_JUMP:
-            return words
-        early, late = (self._coordinates.of(self._recent[one].words) for one in (-1 - multiple, -1))
-        step = factor / (1 - factor) * (late - early)
-        self._extrapolations += 1
-        words = self._coordinates.changed(words, step)
-        self._restart()
-        return words
-
     def result(self, motion: str, words: Words) -> Settled:
         multiple, error = self._multiple()
         if motion != "periodic":
@@ -373,7 +343,6 @@ class _Settling:
             words,
             time_of(words) - self._start,
             self._count,
-            self._extrapolations,
             error if motion == "periodic" else math.nan,
             np.array(self._rows).reshape(-1, 3),
             self._amplitudes.batches,

@@ -705,7 +705,9 @@ contains
                self%record(row_stiffness, contact) = stiffness
                self%record(row_limit, contact) = schedule%site_limit(event)
                call self%births%request(contact, self%parameters, self%record)
+               self%touches = .true.
                call self%join(contact, pose)
+               self%touches = .false.
             else
                call self%leave(contact)
                self%record(row_stiffness, contact) = 0.0_wp

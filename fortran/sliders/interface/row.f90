@@ -144,7 +144,7 @@ contains
       call load_motion(self, block, series, order)
       window = self%block(block)%window
       if (self%has_clocks) call limit_window(self%block(block)%clock, self%base_time &
-         & + self%moment(block), self%speed(block), 2.0_wp * self%bend(block), window)
+         & + self%moment(block), self%speed(block), window)
       associate (kind => self%block(block)%kind)
          kind = event_none
          step = self%length

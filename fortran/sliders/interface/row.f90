@@ -19,7 +19,7 @@ module mesoslip_sliders_interface_row
    use mesoslip_sliders_interface_rest, only: try_rest
    use mesoslip_sliders_interface_series, only: drive_at, expand, expand_all, fastest_rate, &
       & expand_published, shorten_step, whole_length
-   use mesoslip_sliders_interface_state, only: busy_pace, excess_type, load_motion, &
+   use mesoslip_sliders_interface_state, only: add_exactly, busy_pace, excess_type, load_motion, &
       & min_order, min_pace, motion_of_damper, quiet_pace, row_state_type
    use mesoslip_sliders_motion_series, only: first_end, inverse
    implicit none
@@ -237,9 +237,11 @@ contains
       select case (self%block(block)%kind)
       case (event_upper)
          self%place(block) = self%block(block)%window%upper
+         self%place_remainder(block) = 0.0_wp
          call receive(self, block, .true.)
       case (event_lower)
          self%place(block) = self%block(block)%window%lower
+         self%place_remainder(block) = 0.0_wp
          call receive(self, block, .true.)
       case (event_time, event_clock)
          call receive(self, block, .false.)
@@ -324,21 +326,6 @@ contains
          end associate
       end if
    end subroutine carry
-
-   !> Move a block, and keep what its displacement does not hold.
-   elemental subroutine add_exactly(place, remainder, displacement)
-      !> Displacement [m], and its part below rounding
-      real(wp), intent(inout) :: place
-      real(wp), intent(out) :: remainder
-      !> Increase, with the remainder before [m]
-      real(wp), intent(in) :: displacement
-
-      real(wp) :: before
-
-      before = place
-      place = before + displacement
-      remainder = displacement - (place - before)
-   end subroutine add_exactly
 
    !> Move all blocks that go on as published to the end of the step, with their books.
    subroutine carry_published(self)

@@ -23,6 +23,9 @@ module mesoslip_contacts_populations
 
    !> Maximum part of the contacts that attach in a step of resolution 1
    real(wp), parameter :: max_attached_part = 0.1_wp
+   !> Height of the mean force in a step of resolution 1 above its chord that is tolerated, over the
+   !> static force
+   real(wp), parameter :: tolerated_part = 3.0e-3_wp
    !> Part of a step in which nothing may attach without ending it. Activated contacts break in
    !> every step, and rounding gaps between steps would return after each delay
    real(wp), parameter :: thermal_gap = 1.0e-3_wp
@@ -60,6 +63,7 @@ contains
       self%max_attached_at_rest = self%max_attached * min(resolution, max_attached_part)
       self%max_late = self%max_attached * resolution
       call new_pinned_populations(self%pinned, parameters, resolution)
+      self%tolerance = tolerated_part * resolution**2 * parameters%count * parameters%static_force
       call new_detached_packets(self%detached, parameters)
    end subroutine new_contact_populations
 
@@ -163,6 +167,7 @@ contains
       call archive%section("contact populations")
       call exchange_contacts(self, archive)
       call self%pinned%exchange(archive)
+      call archive%exchange("next_step", self%next_step)
       call self%detached%exchange(archive)
       if (self%pinned%has_track) call archive%exchange("factor", self%pinned%factor)
       if (self%parameters%load%changes) then

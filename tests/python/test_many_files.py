@@ -140,6 +140,12 @@ def test_wrong_batches_are_one_message(folder, command):
         )
         assert said in messages
         assert not (folder / "t.csv").exists()
+    first = folder / "first.csv"
+    first.write_text(text(0, 100))
+    status, _, messages = command("trace", "--batch", first, folder / "a.txt", "-o", folder / "out")
+    assert status == 2
+    assert "first.csv: exists, and is no table of a batch" in messages
+    assert first.read_text() == text(0, 100)
     (folder / "there").write_text("")
     for table, outputs in (("t.csv", "there"), ("t.csv", "t.csv")):
         messages = command.refusal(

@@ -266,6 +266,16 @@ def test_units_of_the_field(text, unit, size):
     assert (found and found.size) == (size and pytest.approx(size))
 
 
+def test_options_that_a_record_cannot_have_are_refused(tmp_path):
+    table = tmp_path / "a.csv"
+    rows = "".join(f"{0.01 * at:.2f},{at % 50}\n" for at in range(500))
+    table.write_text("time [s],force [uN]\n" + rows)
+    with pytest.raises(mesoslip.FileError, match="'time \\[parsec\\]': 'parsec' is not a unit"):
+        mesoslip.read_trace(table, columns="time [parsec], force [uN]")
+    with pytest.raises(mesoslip.ConfigError, match="below half of the sampling rate, 50 Hz"):
+        mesoslip.read_trace(table, hum="51 Hz")
+
+
 def test_volts_have_a_factor_and_an_offset(tmp_path):
     table = "t_s\tCH3 [V]\n" + ROWS
     description = tmp_path / "run.toml"

@@ -405,7 +405,7 @@ def test_what_a_killed_process_left_behind_is_removed(tmp_path):
     number = os.open(locked, os.O_RDONLY)
     fcntl.flock(number, fcntl.LOCK_EX)
     try:
-        targets.check_writable(tmp_path / "out.nc")
+        targets.check_output(tmp_path / "out.nc")
     finally:
         os.close(number)
     assert sorted(tmp_path.iterdir()) == sorted([link, *others])

@@ -239,7 +239,7 @@ def test_the_command_writes_a_page(tmp_path, command):
     assert command("report", output)[0] == 0
     assert (tmp_path / "run.html").exists()
     errors = command.refusal("report", output, "-o", output)
-    assert "is the name of an output" in errors
+    assert "is read by the command" in errors
     assert command("report", tmp_path / "none.nc")[0] == 2
 
 

@@ -47,7 +47,7 @@ def test_a_file_system_without_locks_is_reported(output, monkeypatch):
     before = output.read_bytes()
     with (
         pytest.raises(FileError, match=r"no locks \(No locks available\).*LOCKING=FALSE"),
-        targets.written_whole(output),
+        targets.written_whole(output, is_output=True),
     ):
         fail()
     assert output.read_bytes() == before

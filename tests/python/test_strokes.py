@@ -383,6 +383,16 @@ def test_revolutions_are_drawn_one_by_one() -> None:
         assert (steps[np.isfinite(steps)] >= 0).all()
 
 
+def test_maxima_are_drawn_where_no_mean_is_known(tmp_path) -> None:  # type: ignore[no-untyped-def]
+    """In partial slip without a load point."""
+    found, record = strokes_of_made(1151, tmp_path)
+    tree = record_tree(record.time, record.force)
+    axes = mesoslip.plot(tree, view="strokes").axes[1]
+    assert axes.get_ylabel() == "maximum friction (mN)"
+    drawn = sum(len(one.get_children()[0].get_xdata()) for one in axes.containers)
+    assert drawn == len(found.columns["strokes"]["max_friction"])
+
+
 def test_colours_of_a_map_are_those_of_sliding() -> None:
     """A reversal of a tenth of the stroke, beside friction that varies by 4 %."""
     x = np.sin(2 * np.pi * phases())
@@ -561,6 +571,13 @@ def test_friction_of_partial_slip_without_a_load_point_has_a_lower_limit(number,
     assert limit.error < 0.02 * swing
     assert "of sliding is at least" in "\n".join(found.notes)
     assert found.to_json()["min_friction"]["mean"] == limit.value
+
+
+@pytest.mark.parametrize("number", [1001, 1226])
+def test_a_fall_or_two_among_thousands_of_samples_are_noise(number, tmp_path):
+    """Many minimum falls are tried, and the ratios of few rises and falls are not normal."""
+    made(number).write(tmp_path / "a.csv")
+    assert mesoslip.read_trace(tmp_path / "a.csv")["slips"].sizes["slip"] == 0
 
 
 def test_the_sign_of_a_force_in_partial_slip_is_by_the_energy(tmp_path):

@@ -42,11 +42,15 @@ module mesoslip_contacts_populations_breaking
       !> Sums over the breaks: contacts, mass, work that the breaks save [J], and force that the
       !> contacts would bear at the end [N]
       real(wp) :: breaks = 0.0_wp, mass = 0.0_wp, work = 0.0_wp, drop = 0.0_wp
+      !> Stiffness of the contacts that break [N/m]
+      real(wp) :: stiffness = 0.0_wp
       !> The same of contacts that reach their thresholds, which break with the displacement; the
       !> others break with the time
       real(wp) :: cut_breaks = 0.0_wp, cut_work = 0.0_wp, cut_drop = 0.0_wp
       !> Displacement at which the next population breaks [m]
       real(wp) :: next = 0.0_wp
+   contains
+      procedure, non_overridable :: bend, growth
    end type trial_type
 
    !> Pinned populations of which contacts break.
@@ -63,6 +67,31 @@ module mesoslip_contacts_populations_breaking
    end type breaking_populations_type
 
 contains
+
+   !> Height by which the mean force in the trial lies above its chord, by breaks at thresholds [N].
+   elemental function bend(self)
+      class(trial_type), intent(in) :: self
+      real(wp) :: bend
+
+      bend = 0.5_wp * self%cut_drop - self%cut_work / self%reach
+   end function bend
+
+   !> Half the change of the rate of breaks over the displacement, over its mean.
+   !>
+   !> Contacts that break at a part s of the displacement h would bear k (1 - s) h more at its end:
+   !> at a constant rate these forces bend the force by K h / 12, for all of the stiffness K.
+   elemental function growth(self)
+      class(trial_type), intent(in) :: self
+      real(wp) :: growth
+
+      real(wp) :: force
+
+      force = self%drop - 0.5_wp * self%stiffness * self%reach
+      growth = 0.0_wp
+      if (force * self%reach > 0.0_wp) then
+         growth = (6.0_wp * self%bend() - 0.5_wp * self%stiffness * self%reach) / force
+      end if
+   end function growth
 
    !> Find what breaks until the slider reaches a displacement [m] at a time [s].
    subroutine try(self, before, displacement, time, direction, late, onset, error)
@@ -183,6 +212,7 @@ contains
       real(wp), intent(inout) :: late, onset
 
       real(wp) :: loss(moments_length), distance, force, max_breaks, edge, breaks, mass, work, drop
+      real(wp) :: stiffness
       integer :: row, one
 
       associate (trial => self%trial)
@@ -192,6 +222,7 @@ contains
          mass = 0.0_wp
          work = 0.0_wp
          drop = 0.0_wp
+         stiffness = 0.0_wp
          do one = 1, trial%count
             row = trial%population(one)
             force = trial%force(one)
@@ -202,6 +233,7 @@ contains
             trial%lost(one) = loss(lost)
             breaks = breaks + loss(number)
             mass = mass + loss(massive)
+            stiffness = stiffness + loss(stiff)
             drop = drop + loss(stiff) * distance + loss(number) * force
             work = work + 0.5_wp * (loss(stiff) * distance**2 &
                & + 2.0_wp * loss(number) * force * distance + loss(compliant) * force**2 &
@@ -216,6 +248,7 @@ contains
          end do
          trial%breaks = breaks
          trial%mass = mass
+         trial%stiffness = stiffness * self%parameters%stiffness
          trial%work = work * self%parameters%static_force * self%stretch
          trial%drop = drop * self%parameters%static_force
          trial%cut_breaks = trial%breaks
@@ -421,6 +454,8 @@ contains
                ahead = min(ahead, population(row, column_ahead))
                behind = max(behind, population(row, column_behind))
             else if (.not. self%keeps_order) then
+               if (self%newest == row) self%newest = 0
+               if (self%newest == self%count) self%newest = row
                population(row, :) = population(self%count, :)
                self%left(:, row) = self%left(:, self%count)
                if (allocated(self%mix)) self%mix(:, row) = self%mix(:, self%count)
@@ -447,6 +482,7 @@ contains
       integer :: row, kept
 
       kept = 0
+      self%newest = 0
       do row = 1, self%count
          if (.not. self%left(number, row) > 0.0_wp) then
             if (row > self%count - self%open_count) self%open_count = 0

@@ -76,7 +76,7 @@ contains
    end function excess_of_mean
 
    !> Displacement of the slider at a time of its last motion, by Hermite's interpolation [m].
-   pure function position_at(before, after, time) result(displacement)
+   elemental function position_at(before, after, time) result(displacement)
       type(pose_type), intent(in) :: before, after
       real(wp), intent(in) :: time
       real(wp) :: displacement

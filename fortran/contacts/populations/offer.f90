@@ -4,7 +4,7 @@
 !> inertial slider hardly changes its acceleration. In a step the contact force changes with the
 !> displacement by breaks, and with the time by attachments: a chord of the true force, shifted so
 !> that it does the true work. Chords of successive steps meet, so that the slider is not shaken.
-!> The steps are of second order.
+!> The steps are of second order, and the longer the less the force bends in them.
 module mesoslip_contacts_populations_offer
    use mesoslip_contacts_populations_breaking, only: tiny_gap
    use mesoslip_contacts_populations_loading, only: add_load_changes, end_of_load_step, &
@@ -36,6 +36,11 @@ module mesoslip_contacts_populations_offer
    !> Duration of a step of resolution 1 over the time in which an inertial slider oscillates by a
    !> radian
    real(wp), parameter :: rate_part = 1.0_wp
+   !> Maximum of the next step over the last one, and ratio of the lengths among which it is
+   real(wp), parameter :: max_growth_of_step = 2.0_wp, ratio = 2.0_wp**0.25_wp
+   !> Bend over that of the tolerance beyond which a step is shortened, and how often it may be
+   real(wp), parameter :: max_excess = 1.5_wp
+   integer, parameter :: max_attempts = 2
 
 contains
 
@@ -71,7 +76,8 @@ contains
       breaks = breaks .and. .not. rests
       call self%pinned%forget_trial()
 
-      span = time_to_move(expected, direction, self%pinned%step)
+      self%next_step = max(self%pinned%step, min(self%next_step, self%pinned%max_step))
+      span = time_to_move(expected, direction, self%next_step)
       max_span = huge(1.0_wp)
       if (.not. is_quiet) max_span = max_duration(self, pose)
       max_births = self%max_attached
@@ -94,15 +100,16 @@ contains
       span = min(span, births%end_time - pose%time)
       distance = distance_in(expected, direction, span)
       reach = max(distance, min_part * self%pinned%step)
-      limit = self%pinned%step
+      limit = self%next_step
       if (breaks .and. self%pinned%is_thermal) then
          call look_ahead_thermal(self, expected, direction, max_births, span, distance, reach, &
             & limit, births)
          max_span = span
       else if (breaks) then
-         call look_ahead(self, pose, direction, max_births, span, distance, reach, limit, births)
+         call find_step(self, pose, direction, max_births, span, distance, reach, limit, births)
       end if
       breaks = self%pinned%trial%count > 0
+      if (.not. breaks) self%next_step = max_growth_of_step * self%next_step
 
       load_change = expected_change(self, min(time_after(pose%time, span), load_end))
       moves = breaks .or. births%number > 0.0_wp .or. abs(load_change) > 0.0_wp
@@ -212,6 +219,45 @@ contains
 
    end subroutine look_ahead
 
+   !> Look ahead, shorten a step in which the force bends too much, and find the displacement of the
+   !> next one.
+   subroutine find_step(self, pose, direction, max_births, span, distance, reach, limit, &
+      & births)
+      class(population_state_type), intent(inout) :: self
+      type(pose_type), intent(in) :: pose
+      !> As for look_ahead
+      real(wp), intent(in) :: direction, max_births
+      real(wp), intent(inout) :: span, distance, reach, limit
+      type(expected_births_type), intent(inout) :: births
+
+      real(wp) :: bend, length
+      integer :: attempt
+
+      call look_ahead(self, pose, direction, max_births, span, distance, reach, limit, births)
+      if (.not. self%pinned%adapts) return
+      do attempt = 0, max_attempts
+         length = max_growth_of_step * self%next_step
+         if (self%pinned%trial%count == 0) exit
+         bend = abs(self%pinned%trial%bend())
+         ! The bend grows with the square of the displacement.
+         if (reach**2 * self%tolerance < length**2 * bend) then
+            length = reach * sqrt(self%tolerance / bend)
+         end if
+         if (bend < max_excess * self%tolerance .or. reach <= self%pinned%step &
+            & .or. attempt == max_attempts) exit
+         reach = max(self%pinned%step, length)
+         limit = min(limit, reach)
+         if (reach < distance) then
+            call self%detached%shorten_step(pose, direction, time_to_move(pose, direction, reach), &
+               & max_births, span, distance, births)
+            reach = max(distance, min_part * self%pinned%step)
+         end if
+         call look_ahead(self, pose, direction, max_births, span, distance, reach, limit, births)
+      end do
+      ! One of some lengths: rounding errors would grow from step to step.
+      self%next_step = self%pinned%step * ratio**floor(log(length / self%pinned%step) / log(ratio))
+   end subroutine find_step
+
    !> Maximum duration of a step in which the motion hardly changes [s].
    pure function max_duration(self, pose) result(duration)
       class(population_state_type), intent(in) :: self
@@ -249,8 +295,8 @@ contains
             slope = -trial%cut_drop / trial%reach
             ! The true force lies between those of the start and of the end. Contacts that attached
             ! in the step before may be due at once, at no distance.
-            middle = 0.5_wp * trial%cut_drop - trial%cut_work / trial%reach
-            middle = max(-0.5_wp * abs(trial%cut_drop), min(0.5_wp * abs(trial%cut_drop), middle))
+            middle = max(-0.5_wp * abs(trial%cut_drop), &
+               & min(0.5_wp * abs(trial%cut_drop), trial%bend()))
             mass = mass + (trial%mass - (trial%breaks - trial%cut_breaks)) &
                & * distance / trial%reach + (trial%breaks - trial%cut_breaks)
             number = number + trial%cut_breaks * distance / trial%reach &

@@ -332,21 +332,23 @@ contains
    end subroutine expect
 
    !> Take out all contacts that are due to attach.
-   subroutine take_due(self, before, after, births, moment, when, held)
+   subroutine take_due(self, before, after, births, moment, square, when, held)
       class(detached_packets_type), intent(inout) :: self
       type(pose_type), intent(in) :: before, after
-      !> Their number, and sums over them of displacement [m] and time [s] of attaching
-      real(wp), intent(out) :: births, moment, when
+      !> Their number, and sums over them of the displacement in the motion at which they attach
+      !> [m], of its square [m2], and of the time [s]
+      real(wp), intent(out) :: births, moment, square, when
       !> Under a changing load, their numbers by the heights of sites
       real(wp), intent(inout) :: held(:)
 
-      real(wp) :: early, late, part, part_before, more, attached, when_more
+      real(wp) :: early, late, part, part_before, more, attached, when_more, spread, distance(2)
 
       births = 0.0_wp
       moment = 0.0_wp
+      square = 0.0_wp
       when = 0.0_wp
       held = 0.0_wp
-      if (self%is_random) call self%take_random(before, after, births, moment, when, held)
+      if (self%is_random) call self%take_random(before, after, births, moment, square, when, held)
       do while (self%first <= self%last)
          call self%due_times(self%first, early, late)
          if (early > after%time) exit
@@ -363,7 +365,12 @@ contains
                & * mean_time(part_before, part, packet(row_growth))
             births = births + more
             if (allocated(self%mix)) held = held + more * self%mix(:, self%first)
-            moment = moment + more * position_at(before, after, when_more)
+            ! Two points with the mean and about the variance of the times.
+            spread = (packet(row_end) - packet(row_start)) * (part - part_before) / sqrt(12.0_wp)
+            distance = position_at(before, after, when_more + [-spread, spread]) &
+               & - before%displacement
+            moment = moment + 0.5_wp * more * sum(distance)
+            square = square + 0.5_wp * more * sum(distance**2)
             when = when + more * when_more
             call self%mass%add(-packet(row_mass) * attached)
          end associate
@@ -449,12 +456,12 @@ contains
    end subroutine expect_random
 
    !> The same as take_due for exponential delays.
-   subroutine take_random(self, before, after, births, moment, when, held)
+   subroutine take_random(self, before, after, births, moment, square, when, held)
       class(detached_packets_type), intent(inout) :: self
       type(pose_type), intent(in) :: before, after
-      real(wp), intent(inout) :: births, moment, when, held(:)
+      real(wp), intent(inout) :: births, moment, square, when, held(:)
 
-      real(wp) :: duration, ratio, part(2), number(2), time(2)
+      real(wp) :: duration, ratio, part(2), number(2), time(2), length
 
       duration = after%time - before%time
       ratio = duration / self%delay
@@ -467,8 +474,10 @@ contains
          held = part(1) * max(0.0_wp, self%held - self%fresh_held) + part(2) * self%fresh_held
          self%fresh_held = 0.0_wp
       end if
-      moment = number(1) * position_at(before, after, time(1)) &
-         & + number(2) * position_at(before, after, time(2))
+      moment = sum(number * (position_at(before, after, time) - before%displacement))
+      ! Nearly even over the motion.
+      length = after%displacement - before%displacement
+      if (births > 0.0_wp) square = moment**2 / births + births * length**2 / 12.0_wp
       when = sum(number * time)
       call self%mass%add(-part(1) * max(0.0_wp, self%mass%total() - self%fresh(2)) &
          & - part(2) * self%fresh(2))

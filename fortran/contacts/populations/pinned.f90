@@ -7,8 +7,8 @@ module mesoslip_contacts_populations_pinned
    use mesoslip_contacts_partial_moments, only: new_partial_moments
    use mesoslip_contacts_populations_activation, only: new_activation
    use mesoslip_contacts_populations_breaking, only: unresolved_part
-   use mesoslip_contacts_populations_rows, only: column_weight, compliant, moments_length, &
-      & new_population_rows, number, stiff
+   use mesoslip_contacts_populations_rows, only: column_origin, column_weight, compliant, &
+      & moments_length, new_population_rows, number, stiff
    use mesoslip_contacts_populations_table_lives, only: new_table_lives, newborn_law
    use mesoslip_contacts_populations_thermal, only: joining_part, thermal_populations_type
    use mesoslip_numerics_errors, only: error_type
@@ -26,6 +26,12 @@ module mesoslip_contacts_populations_pinned
    real(wp), parameter :: track_part = 0.4_wp
    !> Stretch beyond which the cells of the initial states of wide laws grow with it
    real(wp), parameter :: min_even = 0.02_wp
+   !> Maximum length of a step in which the force hardly bends: over that by the resolution, over
+   !> the spread of the breaking stretches, and over the resolution times the stretch in a life
+   real(wp), parameter :: max_growth = 4.0_wp, max_part = 0.9_wp, max_stretch_part = 0.03_wp
+   !> Distance of neighbouring populations over the sum of the displacements in which they attached,
+   !> and maximum shift over the latter
+   real(wp), parameter :: min_gap = 0.3_wp, max_gap = 0.7_wp, max_shift = 0.2_wp
    !> Maximum distance to a population that contacts join, over the length of a step, and maximum
    !> broken part of it
    real(wp), parameter :: join_part = 0.125_wp, max_loss = 1.0e-3_wp
@@ -44,6 +50,10 @@ module mesoslip_contacts_populations_pinned
       real(wp) :: newborn_force = 0.0_wp
       !> Mean stiffness of a contact that touches [N/m]
       real(wp) :: touching_stiffness = 0.0_wp
+      !> Maximum displacement of a step in which the force hardly bends [m]; whether steps become
+      !> longer and populations follow the density of neighbours: where thresholds are narrow
+      real(wp) :: max_step = 0.0_wp
+      logical :: adapts = .false.
       !> Whether contacts that attach may join a population that attached close by, as it does not
       !> matter when or at which strength
       logical, private :: may_join_any = .false.
@@ -57,7 +67,7 @@ module mesoslip_contacts_populations_pinned
    contains
       procedure, non_overridable :: set_ageing, activate, initialize, attach, touch, sum_newborns
       procedure, non_overridable, private :: tabulate_moments, place_classes, law_of, &
-         & may_join_last, add_sliding
+         & may_join_last, add_sliding, follow_neighbour
    end type pinned_populations_type
 
 contains
@@ -85,6 +95,10 @@ contains
       else
          call self%tabulate_moments()
       end if
+      self%max_step = min(max_growth * self%step, max_part * self%step / (step_part * resolution), &
+         & max_stretch_part * resolution * self%stretch * (1.0_wp - parameters%back_force_ratio))
+      if (self%has_track) self%max_step = self%step
+      self%adapts = self%max_step > self%step
       self%may_join_any = .not. (self%has_table .or. self%has_track)
       call self%sum_newborns(1.0_wp)
    end subroutine new_pinned_populations
@@ -121,9 +135,11 @@ contains
       class(pinned_populations_type), intent(inout) :: self
       real(wp), intent(in) :: rate, width, resolution
 
+      self%adapts = .false.
       self%may_join_any = .false.
       call self%set_activation(new_activation(rate, width, self%stretch), resolution)
       self%step = step_length(hypot(self%parameters%law%width, width), resolution, self%stretch)
+      self%max_step = self%step
    end subroutine activate
 
    !> Set the forces with which contacts attach, from a normal law.
@@ -277,26 +293,27 @@ contains
 
    !> Attach contacts as one population for each force, at their mean displacement, or let them join
    !> others.
-   subroutine attach(self, births, moment, direction, displacement, birth, time, lost, error)
+   subroutine attach(self, births, origin, variance, direction, slowness, displacement, birth, &
+      & time, lost, error)
       class(pinned_populations_type), intent(inout) :: self
-      !> Number of contacts, sum of their displacements [m], and direction of their forces
-      real(wp), intent(in) :: births, moment, direction
+      !> Number of contacts, mean [m] and variance [m2] of the displacements at which they attach,
+      !> direction of their forces, and time over displacement in the motion [s/m]
+      real(wp), intent(in) :: births, origin, variance, direction, slowness
       !> Displacement of the slider [m], mean time of attaching, and time [s]
       real(wp), intent(in) :: displacement, birth, time
       !> Elastic energy that is lost as contacts join others [J]
       real(wp), intent(out) :: lost
       type(error_type), allocatable, intent(inout) :: error
 
-      real(wp) :: origin, force, mean_force, moments(moments_length)
+      real(wp) :: force, mean_force, moments(moments_length)
       integer :: class, row
       logical :: joins
 
       call self%stiffness%add(self%newborn_stiffness * births)
-      call self%offset%add(self%newborn_stiffness * moment &
-         & - self%parameters%static_force * births * (direction * self%newborn_force))
+      call self%offset%add(births * (self%newborn_stiffness * origin &
+         & - self%parameters%static_force * (direction * self%newborn_force)))
       self%last_birth = time
       lost = 0.0_wp
-      origin = moment / births
       joins = .false.
       if (self%is_thermal) joins = self%may_join_last(origin, birth, direction)
       do class = 1, self%classes
@@ -322,11 +339,61 @@ contains
             if (self%is_thermal) call self%begin_hazard(self%count, time - birth, mean_force)
          end if
       end do
+      if (self%adapts .and. self%classes == 1) call self%follow_neighbour(row, births, &
+         & sqrt(12.0_wp * variance), direction, slowness, displacement, time, lost)
       if (joins .or. .not. self%is_thermal) return
       self%open_count = self%classes
       self%open_origin = origin
       self%open_direction = direction
    end subroutine attach
+
+   !> Shift the origins of the last two populations, neighbours of different density.
+   !>
+   !> A sum over populations at their mean origins lacks the spread of each: its error is that of a
+   !> sum of a_i f'' with a = births * width**2 / 24. With f'' by the differences of f' between
+   !> neighbours it becomes one of f', which shifts of the origins cancel.
+   subroutine follow_neighbour(self, joined, births, width, direction, slowness, displacement, &
+      & time, lost)
+      class(pinned_populations_type), intent(inout) :: self
+      !> Population that the contacts joined, 0 if none; their number, the displacement in which
+      !> they attached [m], direction of their forces, and time over displacement [s/m]
+      integer, intent(in) :: joined
+      real(wp), intent(in) :: births, width, direction, slowness
+      !> Displacement of the slider [m], and time [s]
+      real(wp), intent(in) :: displacement, time
+      !> Elastic energy, to which that lost by the shifts is added [J]
+      real(wp), intent(inout) :: lost
+
+      real(wp) :: last_width, gap, moment
+
+      if (joined > 0) then
+         self%newest = 0
+         return
+      end if
+      last_width = direction * self%newest_width
+      if (self%newest > 0 .and. last_width > 0.0_wp) then
+         gap = direction * (self%population(self%count, column_origin) &
+            & - self%population(self%newest, column_origin))
+         if (gap > min_gap * (width + last_width) .and. gap < max_gap * (width + last_width)) then
+            moment = direction * (self%newest_births * last_width - births * width) / 48.0_wp
+            call self%shift_row(self%newest, bounded(moment / self%newest_births, &
+               & max_shift * last_width), slowness, displacement, time, lost)
+            call self%shift_row(self%count, bounded(moment / births, max_shift * width), &
+               & slowness, displacement, time, lost)
+         end if
+      end if
+      self%newest = self%count
+      self%newest_births = births
+      self%newest_width = direction * width
+   end subroutine follow_neighbour
+
+   !> A number, or the nearest one within a bound.
+   elemental function bounded(number, bound)
+      real(wp), intent(in) :: number, bound
+      real(wp) :: bounded
+
+      bounded = max(-bound, min(bound, number))
+   end function bounded
 
    !> Let contacts touch as one population without a force.
    subroutine touch(self, contacts, factor, origin, birth, displacement, time, error)

@@ -68,8 +68,8 @@ contains
    end subroutine detach_tried
 
    !> Half the change of the rate of breaks in a motion over the mean rate, from -1 to 1. Contacts
-   !> that reach their thresholds break as fast as the slider moves; by activation they break evenly
-   !> in time.
+   !> that reach their thresholds break as fast as the slider moves, and the work that their breaks
+   !> save has where in the motion they break on average; by activation they break evenly in time.
    pure function growth_of_breaks(self, before, after) result(growth)
       class(population_state_type), intent(in) :: self
       type(pose_type), intent(in) :: before, after
@@ -77,9 +77,10 @@ contains
 
       growth = 0.0_wp
       if (self%pinned%is_thermal) return
-      associate (twice_mean => before%velocity + after%velocity)
-         if (self%pinned%trial%direction * twice_mean > 0.0_wp) then
-            growth = max(-1.0_wp, min(1.0_wp, (after%velocity - before%velocity) / twice_mean))
+      associate (twice_mean => before%velocity + after%velocity, trial => self%pinned%trial)
+         if (trial%direction * twice_mean > 0.0_wp) then
+            growth = (after%velocity - before%velocity) / twice_mean + trial%growth()
+            growth = max(-1.0_wp, min(1.0_wp, growth))
          end if
       end associate
    end function growth_of_breaks
@@ -197,15 +198,15 @@ contains
       class(population_state_type), intent(inout) :: self
       type(pose_type), intent(in) :: before, after
 
-      real(wp) :: births, moment, when, origin, force, lost
+      real(wp) :: births, moment, square, when, origin, force, lost, slowness
       real(wp), allocatable :: held(:)
 
       allocate (held(self%bins()), source=0.0_wp)
-      call self%detached%take_due(before, after, births, moment, when, held)
+      call self%detached%take_due(before, after, births, moment, square, when, held)
       if (.not. births > 0.0_wp) return
       if (size(held) > 0) self%pinned%newborn_mix = held / births
 
-      origin = moment / births
+      origin = before%displacement + moment / births
       if (self%pinned%has_track) then
          call self%pinned%sum_newborns(self%parameters%strength%factor(origin))
       end if
@@ -214,7 +215,11 @@ contains
       call self%step_work%add(-births * (after%displacement - origin) &
          & * (0.5_wp * self%pinned%newborn_stiffness * (after%displacement - origin) &
          & + self%parameters%static_force * force))
-      call self%pinned%attach(births, moment, after%direction, after%displacement, &
+      slowness = 0.0_wp
+      if (abs(after%displacement - before%displacement) > 0.0_wp) slowness = (after%time &
+         & - before%time) / (after%displacement - before%displacement)
+      call self%pinned%attach(births, origin, max(0.0_wp, square / births &
+         & - (moment / births)**2), after%direction, slowness, after%displacement, &
          & min(when / births, after%time), after%time, lost, self%failure)
       call self%step_work%add(lost)
    end subroutine attach_due

@@ -101,6 +101,10 @@ module mesoslip_contacts_populations_rows
       logical :: keeps_order = .false.
       integer :: open_count = 0
       real(wp) :: open_origin = 0.0_wp, open_direction = 1.0_wp
+      !> Row of the population that attached last, 0 if there is none, its number of contacts, and
+      !> the displacement in which they attached, signed [m]
+      integer :: newest = 0
+      real(wp) :: newest_births = 0.0_wp, newest_width = 0.0_wp
       !> Numbers of the populations, shape (count or more, population_length)
       real(wp), allocatable :: population(:, :)
       !> Moments of the pinned contacts, shape (moments_length, count or more)
@@ -112,10 +116,11 @@ module mesoslip_contacts_populations_rows
       !> count or more), and those of the next one, shape (bins)
       real(wp), allocatable :: mix(:, :), newborn_mix(:)
    contains
-      procedure, non_overridable :: add, row_to_join, join, next_break, update_thresholds, &
+      procedure, non_overridable :: add, row_to_join, join, shift_row, next_break, &
+         & update_thresholds, &
          & sum_forces, shift_origin, number_of_contacts, elastic_energy, scale_all, sum_bin, &
          & exchange
-      procedure, non_overridable, private :: make_room, next_break_of_table
+      procedure, non_overridable, private :: make_room, next_break_of_table, find_next_breaks
    end type population_rows_type
 
 contains
@@ -178,11 +183,8 @@ contains
          end if
          if (allocated(self%kept)) self%kept(:, row) = 1.0_wp
          if (allocated(self%mix)) self%mix(:, row) = self%newborn_mix
-         population(row, column_ahead) = max(displacement, self%next_break(row, 1.0_wp, time))
-         population(row, column_behind) = min(displacement, self%next_break(row, -1.0_wp, time))
-         self%ahead = min(self%ahead, population(row, column_ahead))
-         self%behind = max(self%behind, population(row, column_behind))
       end associate
+      call self%find_next_breaks(self%count, displacement, time)
    end subroutine add
 
    !> Last population that contacts attaching with this force at this origin [m] may join: of the
@@ -228,12 +230,65 @@ contains
          left = left + moments
          call self%moments(1)%interpolate(population(row, column_broken), all)
          population(row, column_weight) = left(number) / all(number)
-         population(row, column_ahead) = max(displacement, self%next_break(row, 1.0_wp, time))
-         population(row, column_behind) = min(displacement, self%next_break(row, -1.0_wp, time))
-         self%ahead = min(self%ahead, population(row, column_ahead))
-         self%behind = max(self%behind, population(row, column_behind))
       end associate
+      call self%find_next_breaks(row, displacement, time)
    end subroutine join
+
+   !> Shift the origin of a population [m], and the time at which it attached.
+   subroutine shift_row(self, row, shift, slowness, displacement, time, energy)
+      class(population_rows_type), intent(inout) :: self
+      integer, intent(in) :: row
+      !> Shift of the origin [m], and that of the time over it [s/m]
+      real(wp), intent(in) :: shift, slowness
+      !> Displacement of the slider [m], and time [s]
+      real(wp), intent(in) :: displacement, time
+      !> Elastic energy, to which that lost by the shift is added [J]
+      real(wp), intent(inout) :: energy
+
+      real(wp) :: stiffness, before, moved
+
+      associate (origin => self%population(row, column_origin), left => self%left(:, row))
+         before = origin
+         origin = before + shift
+         ! But for rounding, the shift.
+         moved = origin - before
+         stiffness = self%parameters%stiffness * left(stiff)
+         energy = energy + moved * (stiffness * (displacement - 0.5_wp * (before + origin)) &
+            & + self%parameters%static_force * self%population(row, column_force) * left(number))
+         call self%offset%add(stiffness * moved)
+      end associate
+      associate (birth => self%population(row, column_birth))
+         birth = min(time, birth + moved * slowness)
+      end associate
+      if (.not. self%has_table) then
+         call self%find_next_breaks(row, displacement, time)
+         return
+      end if
+      ! Of the stiffnesses of a table these also say which contacts have broken.
+      associate (ahead => self%population(row, column_ahead), &
+         & behind => self%population(row, column_behind))
+         ahead = ahead + moved
+         behind = behind + moved
+         self%ahead = min(self%ahead, ahead)
+         self%behind = max(self%behind, behind)
+      end associate
+   end subroutine shift_row
+
+   !> Find where contacts of a population break next, from a displacement of the slider [m] on, at
+   !> a time [s].
+   subroutine find_next_breaks(self, row, displacement, time)
+      class(population_rows_type), intent(inout) :: self
+      integer, intent(in) :: row
+      real(wp), intent(in) :: displacement, time
+
+      associate (ahead => self%population(row, column_ahead), &
+         & behind => self%population(row, column_behind))
+         ahead = max(displacement, self%next_break(row, 1.0_wp, time))
+         behind = min(displacement, self%next_break(row, -1.0_wp, time))
+         self%ahead = min(self%ahead, ahead)
+         self%behind = max(self%behind, behind)
+      end associate
+   end subroutine find_next_breaks
 
    !> Make room for one more population.
    subroutine make_room(self, error)
@@ -453,6 +508,9 @@ contains
       call archive%exchange("stiffness", self%stiffness)
       call archive%exchange("offset", self%offset)
       call archive%exchange("last_birth", self%last_birth)
+      call archive%exchange("newest", self%newest)
+      call archive%exchange("newest_births", self%newest_births)
+      call archive%exchange("newest_width", self%newest_width)
       if (.not. self%keeps_order) return
       call archive%exchange("open_count", self%open_count)
       call archive%exchange("open_origin", self%open_origin)

@@ -25,6 +25,9 @@ module mesoslip_contacts_populations_state
       real(wp) :: max_attached = 0.0_wp, max_attached_at_rest = 0.0_wp
       !> Maximum number of breaks in one step of populations that start to break in it
       real(wp) :: max_late = 0.0_wp
+      !> Displacement of the next step, which follows the bend of the force [m], and height of the
+      !> mean force above its chord that a step longer than by the resolution should not exceed [N]
+      real(wp) :: next_step = huge(1.0_wp), tolerance = 0.0_wp
       !> Maximum duration of a step while thresholds fall, over the time of ageing, and for this
       !> step [s]
       real(wp) :: resolution = 1.0_wp, max_fall_time = huge(1.0_wp)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mesoslip.campaign.sweep import groups, stored_measures
-from mesoslip.campaign.sweep_plan import COMBINATION_BYTES, Plan
+from mesoslip.campaign.sweep_plan import Plan
 from mesoslip.configuration.config import Config
 from mesoslip.execution.store import Pieces
 from mesoslip.simulation.realization import Realization
@@ -65,7 +65,7 @@ def estimate(plan: Plan, store: Pieces, workers: int) -> Estimate:
     wall = max(mean * missing_count / workers, alone) + START_SECONDS if missing else 0.0
     # Three copies: in the tables of the kernel, in the tree, and in measures.
     memory = (workers + 1) * PROCESS_BYTES + 3 * workers * float(np.max(plan.record_bytes))
-    memory += COMBINATION_BYTES * len(plan.keys)
+    memory += plan.memory_bytes
     disk: float = plan.count * (POINT_BYTES + 8 * (1 + len(plan.measures)))
     if plan.sweep.traces:
         disk += float(np.sum(plan.record_bytes)) * plan.realizations

@@ -28,9 +28,9 @@ from mesoslip.simulation.memory import free_memory, output_bytes
 
 # Maximum number of wrong combinations that are listed.
 MAX_REPORTED = 5
-# Combinations after which progress is reported, and memory that each takes in a sweep [bytes].
+# Combinations after which progress is reported; memory of each, and of each point [bytes].
 STEP = 1000
-COMBINATION_BYTES = 1.1e3
+COMBINATION_BYTES, POINT_BYTES = 600.0, 500.0
 
 
 class Plan:
@@ -88,6 +88,11 @@ class Plan:
     def count(self) -> int:
         """Number of points: realizations of all combinations."""
         return math.prod(self.shape) * self.realizations
+
+    @property
+    def memory_bytes(self) -> float:
+        """Memory of the combinations and points of a sweep, without its runs [bytes]."""
+        return COMBINATION_BYTES * math.prod(self.shape) + POINT_BYTES * self.count
 
     def index(self, combination: int) -> tuple[int, ...]:
         """Where a combination is along each axis."""
@@ -166,7 +171,7 @@ class Plan:
 
     def _check_memory(self, count: int) -> None:
         """Refuse a sweep whose combinations alone take more than the free memory."""
-        needed, free = COMBINATION_BYTES * count, free_memory()
+        needed, free = self.memory_bytes, free_memory()
         if needed > free:
             message = (
                 f"has {count} combinations, which take about {needed / 2**30:.3g} GiB of memory, "
@@ -175,10 +180,8 @@ class Plan:
             raise ConfigError([Problem(self._source, "sweep", message)])
 
     def chains(self) -> Iterator[tuple[int, ...]]:
-        """The combinations in chains, each run of which starts from the end of the one before.
-
-        Without `sweep.continue` each combination is a chain of its own.
-        """
+        """The combinations in chains, of which each run starts from the end of the one before;
+        without `sweep.continue` each is a chain of its own."""
         if self.sweep.continue_ is None:
             return ((one,) for one in range(math.prod(self.shape)))
         return chained(self.axes, self.sweep)

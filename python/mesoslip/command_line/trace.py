@@ -193,6 +193,11 @@ def _read_each(
     targets.check_writable(table, files)
     if folder == table or (folder.exists() and not folder.is_dir()):
         raise FileError(f"{folder}: is a file; outputs of a batch need the name of a folder (-o)")
+    if not batch.may_be_replaced(table):
+        raise FileError(
+            f"{table}: exists, and is no table of a batch; --batch is followed by the name of the "
+            "table, and then by the files"
+        )
     with stopped_by_signals() as stop, progress_shown(False, "reading") as progress:
         rows = batch.read_pieces(pieces, stop, executor=workers, progress=progress)
     table_files.write_table(rows, batch.COLUMNS, table)

@@ -148,8 +148,8 @@ def usable_summaries(simulator: Simulator) -> tuple[Array, NDArray[np.bool_]]:
 
 
 def _dominated_by_noise(experiment: Experiment, seed: int) -> NDArray[np.bool_]:
-    """Whether doubling the noise, which changes a summary as much as the noise already has, shows
-    that it dominates."""
+    """Whether the noise dominates each summary: doubled, it changes the summary as much as it has
+    changed it already."""
     summarizer = experiment.summarizer
     observed = summarizer(experiment.force)
     rng = np.random.default_rng([seed, 3])

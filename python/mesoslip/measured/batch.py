@@ -39,6 +39,8 @@ COLUMNS = {
     "mean_waiting_time": "s",
     "message": "-",
 }
+# Start of a table.
+HEADER = b"file [-],output [-],"
 Row = dict[str, Any]
 
 
@@ -73,6 +75,14 @@ def output_name(file: Path) -> str:
     return f"{Path(file.stem).stem if file.suffix in PACKED else file.stem}.nc"
 
 
+def may_be_replaced(table: Path) -> bool:
+    """Whether a table may take a name: no measurement has it, such as the first of all files."""
+    if not table.exists() or table.suffix.lower() in {".md", ".tex"}:
+        return True
+    with table.open("rb") as file:
+        return file.readline(len(HEADER)) in {b"", HEADER}
+
+
 def read_pieces(
     pieces: Sequence[Piece],
     stop: StopRequest,
@@ -80,8 +90,8 @@ def read_pieces(
     executor: ExecutorLike = None,
     progress: Callable[[float], None] = lambda _: None,
 ) -> list[Row]:
-    """Read files and write their outputs; the rows of those before a stop, of a file that cannot be
-    read with the message."""
+    """Read files and write their outputs; returns the rows of those read before a stop, with a
+    message for a file that cannot be read."""
     pool = as_executor(executor, ThreadsThenProcesses)
     rows = []
     with closing(completed(pool, read_piece, pieces, stop, in_order=True)) as done:

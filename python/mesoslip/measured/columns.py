@@ -15,7 +15,15 @@ from mesoslip.configuration.columns import IGNORED
 from mesoslip.configuration.units import NUMBER, is_number, to_si
 from mesoslip.errors import ConfigError, FileError, Problem, shown
 from mesoslip.measured.description import Column, Columns
-from mesoslip.measured.headers import EITHER, QUANTITIES, Heading, bare_name, name_of, read_header
+from mesoslip.measured.headers import (
+    BRACKETS,
+    EITHER,
+    QUANTITIES,
+    Heading,
+    bare_name,
+    name_of,
+    read_header,
+)
 from mesoslip.measured.reading.table import Table, listed
 from mesoslip.measured.units import plain, size_of, unit_named
 
@@ -141,6 +149,11 @@ def _explicit(table: Table, header: str) -> Heading:
             f"{table.path}: --columns: {header!r} is none of {known}; '{IGNORED}' stands for a "
             "column to ignore"
         )
+    given = BRACKETS.search(header)
+    unit = given[0][1:-1].strip() if given else ""
+    # Acoustic emission is often in arbitrary units.
+    if unit not in {"", "-"} and heading.unit is None and quantity != "acoustic_emission":
+        raise FileError(f"{table.path}: --columns: {header!r}: {unit!r} is not a unit")
     return heading._replace(quantity=quantity)
 
 

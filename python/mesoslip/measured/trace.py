@@ -41,6 +41,7 @@ from mesoslip.measured.sampling import MAX_RATES
 from mesoslip.output import variables
 from mesoslip.output.inputs import ConfigLike
 from mesoslip.output.provenance import program_attributes
+from mesoslip.quantities import with_unit
 
 
 @dataclass(frozen=True)
@@ -83,9 +84,12 @@ class Understood:
         given = self.experiment.trace.si("noise")
         if given is not None:
             return given
-        return estimate_noise(
-            self.record.time, self.record.force, hum=self.experiment.trace.si("hum")
-        )
+        time, hum = self.record.time, self.experiment.trace.si("hum")
+        highest = 0.5 / float(np.median(np.diff(time))) if time.size > 1 else math.inf
+        if hum is not None and hum >= highest:
+            message = f"must be below half of the sampling rate, {with_unit(highest, 'Hz', 4)}"
+            raise ConfigError([Problem("", "hum", message, hum)])
+        return estimate_noise(time, self.record.force, hum=hum)
 
     @property
     def report(self) -> list[str]:

@@ -54,12 +54,13 @@ def check_output(path: Path | None, reads: Iterable[str | Path] = ()) -> None:
 def _check(path: Path, reads: Iterable[str | Path], *, is_output: bool) -> None:
     if path.suffix == ".toml":
         raise FileError(f"{path}: is the name of a configuration; give the output another name")
+    for one in map(Path, reads):
+        with suppress(OSError, ValueError):
+            if path.samefile(one):
+                raise FileError(f"{path}: is read by the command; give its output another name")
     if path.suffix == ".nc" and not is_output:
         raise FileError(f"{path}: is the name of an output; give the file another name")
     target = _target(path, is_output=is_output)
-    for one in map(Path, reads):
-        if target.exists() and one.exists() and target.samefile(one):
-            raise FileError(f"{path}: is read by the command; give its output another name")
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         _remove_left_behind(target.parent)

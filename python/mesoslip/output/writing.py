@@ -56,8 +56,8 @@ def write_results(
     threads: int = 1,
     progress: Callable[[float], None] | None = None,
 ) -> None:
-    """Write the results of a run block by block, compressed on threads, as `write` the tree of
-    `mesoslip.output.tree.build_tree`."""
+    """Write the results of a run block by block, compressed on threads; the file equals that of
+    `write` for the tree of `mesoslip.output.tree.build_tree`."""
     groups = layout.describe(results)
     with written_whole(path, is_output=True) as part, LOCK:
         with netCDF4.Dataset(part, "w", format="NETCDF4") as file:

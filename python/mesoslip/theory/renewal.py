@@ -78,8 +78,8 @@ def stretch_density(
     newborn_width: float,
     mean_life: float,
 ) -> tuple[Array, float]:
-    """Q(x; X) at stretches x, shape (points), and the fraction at x = X, both adding up to 1; by Γ
-    and the mean life as displacement."""
+    """Q(x; X) at stretches x, shape (points), and the fraction of contacts at x = X, which add up
+    to 1; from Γ over displacement and the mean life."""
     return _Density(config, breaks, newborn_width, mean_life).at(stretch, displacement)
 
 

@@ -182,8 +182,8 @@ def _interface_scales(slider: InterfaceSlider, config: Any) -> RowScales | None:
 
 @singledispatch
 def mode_frequencies(slider: SliderTable) -> list[float]:  # noqa: ARG001
-    """Ascending frequencies of layers with free and with clamped contacts [1/s], between which one
-    on any undamped springs lies."""
+    """Ascending frequencies of layers with free contacts and with clamped ones [1/s]; layers on
+    undamped springs have one between each pair."""
     return []
 
 

@@ -17,7 +17,7 @@ explained in `docs/traces.md`:
 - The **record** has slips only if its falls, with those after rebounds, are faster than its rises,
   by the logarithm of the ratio of their durations, of mean 0 and standard deviation 0.85 in noise
   of any spectrum; or, in an oscillation, if its falls are more equal than those of noise. Both at
-  three standard errors.
+  three standard errors; the first at more for few falls.
   An oscillation that keeps the phase of a clock is hum.
 - A minimum fall that is given is obeyed: all falls above it count but for rebounds.
 

@@ -23,6 +23,8 @@ MAX_FALSE = 0.02
 MAX_OWN = 0.15
 # Significance of the record as a whole, in standard deviations: probability 0.001 by chance.
 SIGNIFICANCE = 3.0
+# More for the mean of few ratios, which is not normal and the largest of many: over their number.
+FEW = 1.5
 # Standard deviation of the logarithm of the duration of a rise over that of the fall after it, and
 # coefficient of variation of squared falls above a threshold, in noise of any spectrum.
 NOISE_RATIOS, NOISE_FALLS = 0.85, 0.7
@@ -134,7 +136,8 @@ def _stands_out(level: Level, threshold: float, is_one_sided: bool) -> bool:
         # Of falls that follow slow rises, as slips do, the ratios are chosen.
         every = level.trace.exceeding(threshold, with_rebounds=True)
         ratios = np.log(level.trace.ratios(*every))
-        if float(ratios.mean()) >= NOISE_RATIOS * SIGNIFICANCE / math.sqrt(ratios.size):
+        significance = SIGNIFICANCE / math.sqrt(ratios.size) + FEW / ratios.size
+        if float(ratios.mean()) >= NOISE_RATIOS * significance:
             return True
     excess = (level.trace.force[tops] - level.trace.force[bottoms]) ** 2 - threshold**2
     is_regular = float(np.std(excess)) <= NOISE_FALLS * (1 - chance) * float(excess.mean())

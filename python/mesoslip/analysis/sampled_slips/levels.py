@@ -142,7 +142,7 @@ class Side:
         self, threshold: float, *, with_rebounds: bool = False
     ) -> tuple[Samples, Samples]:
         """Samples of maximum and minimum of falls after the first sample that exceed rebounds by a
-        threshold; with rebounds, those of the others."""
+        threshold; with rebounds, of all of them."""
         rank = self.extremes.rank(threshold)
         if rank not in self._excess:
             self._excess[rank] = self._excess_of(*self.extremes.falls(threshold))

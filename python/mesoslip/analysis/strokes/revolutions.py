@@ -124,7 +124,7 @@ def _peak(correlation: Array, near: int, reach: int) -> float:
 def _angle(tree: Tree, realization: int, time: Array, period: float | None) -> tuple[Array, str]:
     """Revolutions at the samples, which do not decrease, and the quantity they are from."""
     if period is not None:
-        return (time - time[0]) / period, "given period"
+        return (time - time[0]) / period, "period"
     root = tree.to_dataset()
     name = COUNT if COUNT in root else SPEED
     values = root[name].values[realization][: time.size].astype(float)

@@ -80,14 +80,18 @@ def draw_loops(axes: Axes, found: Strokes) -> None:
 
 
 def draw_cycles(axes: Axes, found: Strokes) -> None:
-    """Draw the mean friction of each stroke, each direction in a colour."""
+    """Draw the mean friction of each stroke, each direction in a colour; the maximum where no mean
+    is known."""
     name, unit = _unit(found)
     columns = found.columns["strokes"]
-    key = "mean_friction"
+    key, label = "mean_friction", f"mean {name}"
     if unit == "1" and found.force_unit != "1":
         key = "mean_friction_coefficient"
     mine = columns["realization_index"] == 0
-    values, errors = columns[key], columns[f"{key}_error"]
+    if not np.isfinite(columns[key][mine]).any():
+        key, label, unit = "max_friction", "maximum friction", found.force_unit
+    values = columns[key]
+    errors = columns.get(f"{key}_error", np.zeros(values.size))
     known = mine & np.isfinite(values)
     scale = scale_for(float(np.max(np.abs(values[known]), initial=0.0)) or 1.0, unit)
     for direction, colour in ((1, RED), (-1, BLUE)):
@@ -100,7 +104,7 @@ def draw_cycles(axes: Axes, found: Strokes) -> None:
             errors[shown] / scale.size,
             **(POINTS | {"color": colour, "label": DIRECTIONS[direction]}),
         )
-    axes.set(xlabel=found.records[0].singular, ylabel=scale.label(f"mean {name}"))
+    axes.set(xlabel=found.records[0].singular, ylabel=scale.label(label))
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     if len(set(columns["direction"][known].tolist())) > 1:
         legend_above(axes)

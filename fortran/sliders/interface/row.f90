@@ -229,9 +229,11 @@ contains
       !> Whether its contacts have to respond
       logical, intent(out) :: asks
 
-      real(wp) :: start
+      real(wp) :: start, remainder, sense, moved
 
       start = self%place(block)
+      remainder = self%place_remainder(block)
+      sense = self%sense(block)
       call carry(self, block, self%span(block))
       asks = .true.
       select case (self%block(block)%kind)
@@ -248,8 +250,9 @@ contains
       case (event_turn)
          ! Its last velocity is that before the turn, not the rounding of zero.
          self%speed(block) = 0.0_wp
-         if (abs(self%place(block) - start) > 0.0_wp) self%sense(block) = sign(1.0_wp, &
-            & self%place(block) - start)
+         moved = (self%place(block) - start) + (self%place_remainder(block) - remainder)
+         if (abs(moved) > 0.0_wp) sense = sign(1.0_wp, moved)
+         self%sense(block) = sense
       case (event_again, event_publish)
          asks = .false.
       case default

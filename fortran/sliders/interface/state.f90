@@ -69,7 +69,8 @@ module mesoslip_sliders_interface_state
       !> Displacement [m], velocity [m/s], half the acceleration [m/s2], and deceleration by the
       !> damper [m/s2] of each block, at its own time after the start of the step [s]
       real(wp), allocatable :: place(:), speed(:), bend(:), damper(:), moment(:)
-      !> Part of the displacement below its rounding [m]: of steps alike, each is rounded alike
+      !> Part of the displacement below its rounding [m]; without it equal steps would be rounded
+      !> equally
       real(wp), allocatable :: place_remainder(:)
       !> Sign of the last velocity that was not zero
       real(wp), allocatable :: sense(:)

@@ -25,10 +25,10 @@ module mesoslip_hazard
    !> Hazard that is negligible: it is below the rounding of a deviate
    real(wp), parameter :: negligible = 1.0e-16_wp
    !> Maximum exponent of the rate of a contact whose force changed its sign, over that without a
-   !> force; minimum threshold of such a contact over the mean one; and maximum exponent of the
-   !> duration for which its hazard is negligible
+   !> force; minimum threshold of such a contact over the mean one; maximum force of such a contact
+   !> over that minimum; and maximum exponent of the duration for which its hazard is negligible
    real(wp), parameter :: max_turn_exponent = 1.0_wp, min_turn_threshold = 0.9_wp, &
-      & max_duration_exponent = 300.0_wp
+      & max_turn_force = 0.5_wp, max_duration_exponent = 300.0_wp
 
    !> The clocks.
    type :: hazard_type
@@ -158,15 +158,16 @@ contains
       exponent = self%slope * (limit + force_sign(number) * (origin - self%reference(number)))
    end function life_exponent
 
-   !> Set where and how long it makes no difference when a force changes its sign, as the hazard of
-   !> the contact until then is negligible.
+   !> Set where and how long it makes no difference when a force changes its sign: the contact does
+   !> not reach its threshold, and its hazard until then is negligible.
    pure subroutine limit_turns(self, stretch)
       class(hazard_type), intent(inout) :: self
       !> Mean stretch at the threshold [m]
       real(wp), intent(in) :: stretch
 
-      self%turn_distance = max_turn_exponent / self%slope
       self%turn_limit = min_turn_threshold * stretch
+      ! Less than the distance to their thresholds.
+      self%turn_distance = min(max_turn_exponent / self%slope, max_turn_force * self%turn_limit)
       self%turn_duration = negligible / self%rate * exp(min(max_duration_exponent, &
          & self%slope * self%turn_limit - max_turn_exponent))
    end subroutine limit_turns

@@ -104,7 +104,7 @@ module mesoslip_schedule
       !> For each entry by coordinate whether the contact does not break there, but its force gets
       !> the sign of the motion; its stretch at breaking [m], its remaining deviate, and its reading
       !> [s], by the other clock before that and by this one after it. Whether its hazard is
-      !> negligible where that happens, so that the step needs not end there
+      !> negligible where that happens, so that the step need not end there
       logical :: break_turns(max_events) = .false., turns_later(max_events) = .false.
       real(wp) :: turn_limit(max_events) = 0.0_wp, turn_left(max_events) = 0.0_wp, &
          & turn_key(max_events) = 0.0_wp
@@ -180,7 +180,7 @@ contains
    end function window
 
    !> Coordinate up to which forces change their sign without a step of their own; huge if it is not
-   !> known.
+   !> known. The same rule as find_ahead of contacts with clocks, so that results agree to the bit.
    pure subroutine find_stop(self, stop)
       class(schedule_type), intent(in) :: self
       !> The coordinate [m]

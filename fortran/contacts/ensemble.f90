@@ -62,9 +62,10 @@ contains
       allocate (ensemble)
       ensemble%parameters = common
       ensemble%keeps_offers = .true.
-      ensemble%lists_sites = .true.
       call ensemble%allocate_records(columns, rows, error)
       if (allocated(error)) return
+      ! Otherwise the threshold of a contact that touches is one of its own, or by its place.
+      ensemble%lists_sites = .not. (allocated(ensemble%births%force) .or. common%strength%is_used)
       ! A contact that attaches in backward motion starts with the back force against the direction.
       max_distance = common%static_force / common%stiffness &
          & * max(common%law%quantile(rare), 1.0_wp) * (1.0_wp + common%back_force_ratio &

@@ -32,7 +32,8 @@ module mesoslip_recording_ruptures
       logical :: is_open = .false.
       !> When it began, when the block was fast last, and when it ruptured, or never [s]
       real(wp) :: start_time = 0.0_wp, last_time = 0.0_wp, rupture_time = never
-      !> End of the first step after which most contacts were not pinned, never if they are [s]
+      !> End of the first step after which most contacts were not pinned; never if they are, 0 if
+      !> no rupture is pending [s]
       real(wp) :: detached_time = 0.0_wp
       !> Force [N], displacement [m] and breaks when the block was slow last with most contacts
       !> pinned, and breaks at which it ruptures

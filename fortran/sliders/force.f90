@@ -89,8 +89,7 @@ contains
       self%step_time = self%time
       self%start_displacement = self%displacement
       bounds = window
-      if (self%has_clocks) call limit_window(self%clock, self%time, self%velocity, &
-         & self%acceleration, bounds)
+      if (self%has_clocks) call limit_window(self%clock, self%time, self%velocity, bounds)
       force = self%drive%at(self%time)
       self%start_acceleration = acceleration_under(self, force, 0.0_wp)
 

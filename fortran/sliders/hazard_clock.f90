@@ -56,10 +56,10 @@ contains
 
    !> End a window a little after the first clock is expected to reach its reading: a shorter step
    !> takes less time to compute.
-   pure subroutine limit_window(clock, time, velocity, acceleration, window)
+   pure subroutine limit_window(clock, time, velocity, window)
       type(hazard_clock_type), intent(in) :: clock(clocks)
-      !> Time [s], velocity [m/s] and acceleration [m/s2] of the slider
-      real(wp), intent(in) :: time, velocity, acceleration
+      !> Time [s] and velocity [m/s] of the slider
+      real(wp), intent(in) :: time, velocity
       type(window_type), intent(inout) :: window
 
       real(wp) :: expected
@@ -69,17 +69,16 @@ contains
       do number = 1, clocks
          if (.not. (clock(number)%is_used .and. clock(number)%left < huge(1.0_wp))) cycle
          expected = min(expected, expected_time(clock(number)%slope * velocity, &
-            & clock(number)%slope * acceleration, clock(number)%left / clock(number)%rate))
+            & clock(number)%left / clock(number)%rate))
       end do
       if (expected < huge(1.0_wp)) window%end_time = min(window%end_time, &
          & max(time + window_ratio * expected, nearest(time, 1.0_wp)))
    end subroutine limit_window
 
-   !> Time in which the integral of exp(growth t + bend t**2/2) is expected to have a value; huge
-   !> where this estimate does not apply.
-   pure function expected_time(growth, bend, wanted) result(time)
-      !> Growth of the exponent [1/s] and its change [1/s2], the integral [s]
-      real(wp), intent(in) :: growth, bend, wanted
+   !> Time in which the integral of exp(growth t) has a value; huge if it never has.
+   pure function expected_time(growth, wanted) result(time)
+      !> Growth of the exponent [1/s], and the integral [s]
+      real(wp), intent(in) :: growth, wanted
       real(wp) :: time
 
       real(wp) :: y
@@ -92,8 +91,6 @@ contains
          time = huge(1.0_wp)
          if (y > -1.0_wp) time = log(1.0_wp + y) / growth
       end if
-      ! Where the velocity changes much, the slider may move as far as it can.
-      if (abs(bend) * min(time, 1.0e100_wp)**2 > 1.0_wp) time = max(time, 1.0_wp / sqrt(abs(bend)))
    end function expected_time
 
    !> Shorten a step to the first time at which a clock reaches its reading, and advance the clocks.

@@ -25,12 +25,12 @@ module mesoslip_sliders_hazard_series
    integer, parameter :: low_order = 10, tail = 3
    real(wp), parameter :: max_low = 0.12_wp
    real(wp), parameter :: no_change = 1.0e-16_wp
-   !> Maximum terms of the exponent in a step in which a rule of six points is exact to rounding,
-   !> and of the sum of those beyond
+   real(wp), parameter :: max_tail(tail) = no_change * [1.0e4_wp, 1.0e2_wp, 1.0_wp]
+   !> Maximum terms of the exponent in a step in which a rule of six points is exact to 1e-15, and
+   !> of the sum of those beyond
    integer, parameter :: smooth_terms = 6
    real(wp), parameter :: max_smooth(smooth_terms) = [0.12_wp, 6.0e-2_wp, 4.0e-3_wp, 3.0e-4_wp, &
       & 1.0e-5_wp, 1.0e-5_wp], max_rest = 1.0e-10_wp
-   real(wp), parameter :: max_tail(tail) = no_change * [1.0e4_wp, 1.0e2_wp, 1.0_wp]
    !> Bound on the mean of the exponential function over such a step, and one over it
    real(wp), parameter :: max_growth = 1.35_wp
    !> Order of the series beside a linear exponent, and maximum change of that
@@ -371,7 +371,8 @@ contains
       end do
       square = value**2
       even = 1.0_wp + square * (0.5_wp + square * ((1.0_wp / 24.0_wp) + square &
-         & * ((1.0_wp / 720.0_wp) + square * (1.0_wp / 40320.0_wp))))
+         & * ((1.0_wp / 720.0_wp) + square * ((1.0_wp / 40320.0_wp) &
+         & + square * (1.0_wp / 3628800.0_wp)))))
       odd = value * (1.0_wp + square * ((1.0_wp / 6.0_wp) + square * ((1.0_wp / 120.0_wp) &
          & + square * ((1.0_wp / 5040.0_wp) + square * (1.0_wp / 362880.0_wp)))))
       call pass(clock, step, sum(weight_6 * even), sum(weight_6 * odd))

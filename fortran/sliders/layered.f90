@@ -177,8 +177,7 @@ contains
       call self%take_law(law)
       self%step_time = self%time
       bounds = window
-      if (self%has_clocks) call limit_window(self%clock, self%time, self%velocity, &
-         & self%acceleration, bounds)
+      if (self%has_clocks) call limit_window(self%clock, self%time, self%velocity, bounds)
       step = bounds%end_time - self%time
       if (.not. step > 0.0_wp) then
          self%series(:, :, 1:) = 0.0_wp

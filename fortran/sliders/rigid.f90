@@ -227,7 +227,7 @@ contains
       logical :: is_done
 
       window = whole_window
-      call limit_window(self%clock, self%time, self%velocity, self%acceleration, window)
+      call limit_window(self%clock, self%time, self%velocity, window)
       is_done = .false.
       if (.not. abs(self%drive%acceleration) > 0.0_wp) then
          call try_settled_step(self, system, window, early, is_done)

@@ -53,7 +53,7 @@ contains
       values = [real(count, wp), 18.0e-6_wp / count, 2000.0_wp / count, 6.7e-5_wp / count, delay, &
          & 0.1_wp, 1.0_wp, width, merge(0.05_wp, 0.0_wp, index(contacts, "scattered") > 0)]
       ! Without a back force contacts of any threshold may touch.
-      if (contacts == "loaded") values(6) = 0.0_wp
+      if (index(contacts, "loaded") > 0) values(6) = 0.0_wp
       ! Where it is cold, forces change their sign without a step of their own.
       bell = [0.0_wp, 0.0_wp, 1.0e3_wp, merge(0.01_wp, 0.05_wp, index(contacts, "cold") > 0) &
          & * 18.0e-6_wp / count]
@@ -80,7 +80,7 @@ contains
       case ("thermal ageing", "thermal ageing cold")
          call new_parameters(parameters, [character(len=name_length) :: common, ageing, &
             & activation], [values, relax, bell])
-      case ("loaded")
+      case ("loaded", "loaded scattered")
          ! The normal load swings some 15 times in a run.
          call new_parameters(parameters, [character(len=name_length) :: common, "columns", &
             & "rows", "load_mean", "load_amplitude", "load_rate", "load_phase"], &

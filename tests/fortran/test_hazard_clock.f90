@@ -34,9 +34,32 @@ program test_hazard_clock
       & 0.5_wp, "smooth series")
    call the_first_ends_the_step([1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 100.0_wp, 0.0_wp], 0.1_wp, &
       & "series that is not smooth")
+   call smooth_steps_are_exact()
    call finish()
 
 contains
+
+   !> A step with the largest exponent that counts as smooth, against a rule of ten points.
+   subroutine smooth_steps_are_exact()
+      real(wp), parameter :: exponent(6) = 0.999_wp * [0.12_wp, 6.0e-2_wp, 4.0e-3_wp, 3.0e-4_wp, &
+         & 1.0e-5_wp, 1.0e-5_wp]
+      type(hazard_clock_type) :: clock(clocks)
+      real(wp) :: step, series(6), expected
+      integer :: term, number
+      logical :: is_ended
+
+      series = [(term * exponent(term), term=1, size(exponent))]
+      clock%is_used = .true.
+      clock%slope = [1.0_wp, -1.0_wp]
+      clock%rate = 1.0_wp
+      clock%left = 1.0e3_wp
+      step = 1.0_wp
+      call advance_clocks(clock, series, size(series), step, is_ended)
+      do number = 1, clocks
+         expected = reading_after(clock(number)%slope, series, size(series), step)
+         call check_close(clock(number)%elapsed, expected, 1.0e-15_wp, "smooth step")
+      end do
+   end subroutine smooth_steps_are_exact
 
    !> Readings over parts of a step, and the times at which a clock reaches them.
    subroutine exercise(slope, series, name)

@@ -21,6 +21,7 @@ program test_schedules
    call runs_ahead("loaded", "rigid", "exponential", 1.0_wp, 0.0_wp)
    call runs_ahead("loaded", "prescribed", "gaussian", 0.1_wp, 5.0e-4_wp)
    call runs_ahead("loaded", "prescribed", "exponential", 1.0_wp, 5.0e-4_wp)
+   call runs_ahead("loaded scattered", "rigid", "gaussian", 0.1_wp, 5.0e-4_wp)
    call runs_ahead("ageing", "prescribed", "gaussian", 0.1_wp, 5.0e-4_wp)
    call runs_ahead("ageing", "prescribed", "exponential", 1.0_wp, 0.0_wp)
    call runs_ahead("thermal", "rigid", "gaussian", 0.1_wp, 5.0e-4_wp)
@@ -31,9 +32,26 @@ program test_schedules
    call runs_ahead("thermal", "prescribed", "exponential", 1.0_wp, 1.0e-5_wp)
    call runs_ahead("thermal scattered", "rigid", "gaussian", 0.1_wp, 5.0e-4_wp)
    call runs_ahead("thermal scattered", "prescribed", "exponential", 1.0_wp, 1.0e-5_wp)
+   call has_length_by_load("loaded", .false.)
+   call has_length_by_load("loaded scattered", .true.)
    call finish()
 
 contains
+
+   !> Schedules are as long as events of the load let them be, where these are not in them.
+   subroutine has_length_by_load(contacts, is_short)
+      character(len=*), intent(in) :: contacts
+      logical, intent(in) :: is_short
+
+      type(simulation_type) :: run
+      type(error_type), allocatable :: error
+
+      call prepare(run, contacts, "rigid", "gaussian", 0.1_wp, 5.0e-4_wp, max_events)
+      call run%start(initial_steady)
+      call run%run(forever, any_work, error)
+      call check(.not. allocated(error) .and. (run%contacts%schedule_length < max_events / 2 &
+         & .eqv. is_short), "length of schedules under a load: " // contacts)
+   end subroutine has_length_by_load
 
    !> A run is the same to the bit whatever the length of its schedules, 0 included, and wherever it
    !> is saved and continued.

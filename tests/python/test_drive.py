@@ -472,6 +472,23 @@ def test_a_run_ends_at_a_displacement_to_the_bit(kind, way):
     )
 
 
+def test_a_run_ends_at_a_displacement_where_forces_change_their_sign():
+    """With little temperature, forces change their sign without a step of their own. Where only
+    such changes are scheduled before the displacement, the slider must not move past it."""
+    distance = 601.02042e-9
+    config = klein_tables(
+        run={"duration": 0.08, "stop": {"displacement": distance}},
+        drive__velocity=1e-5,
+        contacts__count=60,
+        contacts__threshold__relative_width=0.1,
+        contacts__coupling="equal",
+        contacts__initial="steady",
+        contacts__thermal={"rate": 1e3, "force_ratio": 0.01},
+    )
+    tree = mesoslip.run(Config.from_dict(config))
+    assert stages_of(tree)["end_displacement"].values[-1] == distance
+
+
 # Forward first, so that the contacts are scheduled for that direction; a short wave back and forth.
 BACKWARDS = {
     "after a slide": {},

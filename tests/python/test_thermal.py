@@ -440,6 +440,34 @@ def test_without_temperature_it_is_the_model_without(kind, rate, force_ratio):
     )
 
 
+@pytest.mark.parametrize("seed", [2, 44, 61])
+def test_contacts_reach_their_thresholds_after_a_reversal(seed):
+    """Where the rate is negligible and its dependence on the force weak, forces change their sign
+    without a step of their own; their contacts still break at their thresholds."""
+    tables = unit_tables(
+        2,
+        run={"engine": "eq", "seed": seed},
+        drive={
+            "stage": [
+                {"duration": 1e-3, "start_velocity": -890.0, "end_velocity": -900.0},
+                {"duration": 1e-2, "start_velocity": 1100.0, "end_velocity": 1110.0},
+            ]
+        },
+        contacts__threshold__relative_width=0.5,
+        contacts__initial="uniform",
+        contacts__reattach=False,
+        output__interval=0.011,
+    )
+    thermal = {"rate": 1e-17, "force_ratio": 2.0}
+    warm = tables | {"contacts": tables["contacts"] | {"thermal": thermal}}
+    cold = tables | {"contacts": tables["contacts"] | {"thermal": None}}
+    actual, expected = (mesoslip.run(Config.from_dict(one))["energy"] for one in (warm, cold))
+    for term in ("drive_work", "break_loss"):
+        assert float(actual[term].values[0]) == pytest.approx(
+            float(expected[term].values[0]), rel=1e-12
+        )
+
+
 @pytest.mark.parametrize(
     "changes",
     [

@@ -201,8 +201,8 @@ contains
    end function fallen
 
    !> A lower bound on the threshold at which a contact breaks by the law `log`, as meet_grown finds
-   !> it: an iteration from the present age approaches the solution from below, as long as the
-   !> threshold grows more slowly than the stretch.
+   !> it: two steps of the iteration z = wanted + kappa ln z from z = 1, which approaches the
+   !> greater solution from below if `wanted` is at least 1.
    pure function meet_early(law, configured, age, stretch, scale) result(threshold)
       type(ageing_law_type), intent(in) :: law
       real(wp), intent(in) :: configured, age, stretch, scale

@@ -60,7 +60,7 @@ module mesoslip_contacts_individual_base
       real(wp) :: breaks_at_load = 0.0_wp
       !> Whether the contact that joins touches: it attaches without a force
       logical :: touches = .false.
-      !> Whether the kind lists sites that touch or separate in schedules, and those sites
+      !> Whether sites that touch or separate are listed in schedules, and those sites
       logical :: lists_sites = .false.
       integer, private :: site_listed(max_events) = 0
       !> Maximum number of those sites, by how many moved in the last schedule
@@ -449,9 +449,7 @@ contains
 
       integer :: event, number
 
-      if (.not. self%sites%next_time < huge(1.0_wp)) return
-      ! The contact of a site that touches has a threshold of its own, or one by its place.
-      if (allocated(self%births%force) .or. self%parameters%strength%is_used) return
+      if (.not. (self%lists_sites .and. self%sites%next_time < huge(1.0_wp))) return
       call self%sites%preview(self%parameters, min(limit, self%max_sites), self%site_listed, &
          & schedule%site_touches, schedule%site_time, number)
       do event = 1, number
@@ -707,7 +705,9 @@ contains
                self%record(row_stiffness, contact) = stiffness
                self%record(row_limit, contact) = schedule%site_limit(event)
                call self%births%request(contact, self%parameters, self%record)
+               self%touches = .true.
                call self%join(contact, pose)
+               self%touches = .false.
             else
                call self%leave(contact)
                self%record(row_stiffness, contact) = 0.0_wp

@@ -135,7 +135,6 @@ contains
          number = number + 1
          time(number + 1) = self%next_time
       end do
-      if (self%piece == piece .and. self%count == count) return
       self%count = count
       self%piece = piece
       self%has_begun = has_begun

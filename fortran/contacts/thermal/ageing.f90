@@ -50,7 +50,7 @@ module mesoslip_contacts_thermal_ageing
    !> Maximum number of leaders, and of those whose breaks are extrapolated at once
    integer, parameter :: max_leaders = 64, max_extrapolated = 16
    !> Maximum number of contacts whose forces may change their sign in one motion
-   integer, parameter :: max_turns = 64
+   integer, parameter :: max_turning = 64
    !> Number of deviates of a life, after which they repeat
    integer(i8), parameter :: max_attempts = 65535_i8
 
@@ -80,8 +80,8 @@ module mesoslip_contacts_thermal_ageing
       real(wp), private :: leader_key(max_leaders) = 0.0_wp
       !> Contacts whose forces may change their sign in the present motion, and the coordinates at
       !> which they do [m]; meanwhile they are missing in the order ahead
-      integer, private :: turns = 0, turning(max_turns) = 0
-      real(wp), private :: turn_key(max_turns) = 0.0_wp
+      integer, private :: turns = 0, turning(max_turning) = 0
+      real(wp), private :: turn_key(max_turning) = 0.0_wp
    contains
       procedure :: initialize, offer, respond, plan, leave, begin_life, accepts_break, &
          & update_bounds, rebuild, records, exchange, limit_at_birth, shift_order
@@ -206,7 +206,7 @@ contains
                self%leaders = self%leaders - 1
             else
                call self%order(self%ahead)%due(first, one)
-               if (lets_turn_later .and. self%turns < max_turns &
+               if (lets_turn_later .and. self%turns < max_turning &
                   & .and. self%may_turn_later(one)) then
                   call self%order(self%ahead)%remove(one)
                   self%turns = self%turns + 1

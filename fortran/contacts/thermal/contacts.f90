@@ -316,7 +316,7 @@ contains
 
       call self%order(self%ahead)%first(ahead)
       if (.not. self%hazard%lets_turn_later(pose%velocity)) return
-      ! As in a schedule.
+      ! The same rule as find_stop of a schedule, so that results agree to the bit.
       last = ahead + self%hazard%turn_distance
       turns = 0
       do while (ahead <= last .and. turns < max_turns)

@@ -9,7 +9,8 @@
 module mesoslip_sliders_interface_excess
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_sliders_interface_polynomials, only: evaluate, max_order, moments
-   use mesoslip_sliders_interface_state, only: excess_type, neighbour_motion, row_state_type
+   use mesoslip_sliders_interface_state, only: add_exactly, excess_type, neighbour_motion, &
+      & row_state_type
    implicit none
    private
 
@@ -134,11 +135,10 @@ contains
       if (self%viscosity > 0.0_wp) call motion_around(self, block, around)
       call add_losses_of(self, block, response, around(0), around(1))
       self%excess_once(block) = self%excess_once(block) + response%area
-      associate (place => self%place(block), speed => self%speed(block), &
-         & shift => response%shift, window => self%block(block)%window)
+      associate (place => self%place(block), speed => self%speed(block), shift => response%shift)
          time = 0.0_wp
          if (.not. crosses) then
-            place = max(window%lower, min(window%upper, place + shift))
+            call shift_block(self, block, shift)
          else if (abs(speed) > 0.0_wp .and. abs(shift) <= max_part * self%span(block) &
             & * abs(speed)) then
             time = min(-shift / speed, self%length - self%moment(block))
@@ -200,12 +200,25 @@ contains
       self%speed = self%speed + response%kick + shift + self%bond * area
       shift = response%shift + self%viscosity * area
       do block = 1, self%blocks
-         associate (window => self%block(block)%window)
-            self%place(block) = max(window%lower, min(window%upper, self%place(block) &
-               & + shift(block)))
-         end associate
+         call shift_block(self, block, shift(block))
       end do
    end subroutine receive_all
+
+   !> Move a block within its window.
+   subroutine shift_block(self, block, shift)
+      class(row_state_type), intent(inout) :: self
+      integer, intent(in) :: block
+      !> The displacement [m]
+      real(wp), intent(in) :: shift
+
+      associate (place => self%place(block), remainder => self%place_remainder(block), &
+         & window => self%block(block)%window)
+         call add_exactly(place, remainder, remainder + shift)
+         if (place <= window%upper .and. place >= window%lower) return
+         place = max(window%lower, min(window%upper, place))
+         remainder = 0.0_wp
+      end associate
+   end subroutine shift_block
 
    !> Sum over the neighbours of each block.
    pure function beside(values)

@@ -19,7 +19,7 @@ module mesoslip_sliders_interface_row
    use mesoslip_sliders_interface_rest, only: try_rest
    use mesoslip_sliders_interface_series, only: drive_at, expand, expand_all, fastest_rate, &
       & expand_published, shorten_step, whole_length
-   use mesoslip_sliders_interface_state, only: busy_pace, excess_type, load_motion, &
+   use mesoslip_sliders_interface_state, only: add_exactly, busy_pace, excess_type, load_motion, &
       & min_order, min_pace, motion_of_damper, quiet_pace, row_state_type
    use mesoslip_sliders_motion_series, only: first_end, inverse
    implicit none
@@ -144,7 +144,7 @@ contains
       call load_motion(self, block, series, order)
       window = self%block(block)%window
       if (self%has_clocks) call limit_window(self%block(block)%clock, self%base_time &
-         & + self%moment(block), self%speed(block), 2.0_wp * self%bend(block), window)
+         & + self%moment(block), self%speed(block), window)
       associate (kind => self%block(block)%kind)
          kind = event_none
          step = self%length
@@ -229,25 +229,30 @@ contains
       !> Whether its contacts have to respond
       logical, intent(out) :: asks
 
-      real(wp) :: start
+      real(wp) :: start, remainder, sense, moved
 
       start = self%place(block)
+      remainder = self%place_remainder(block)
+      sense = self%sense(block)
       call carry(self, block, self%span(block))
       asks = .true.
       select case (self%block(block)%kind)
       case (event_upper)
          self%place(block) = self%block(block)%window%upper
+         self%place_remainder(block) = 0.0_wp
          call receive(self, block, .true.)
       case (event_lower)
          self%place(block) = self%block(block)%window%lower
+         self%place_remainder(block) = 0.0_wp
          call receive(self, block, .true.)
       case (event_time, event_clock)
          call receive(self, block, .false.)
       case (event_turn)
          ! Its last velocity is that before the turn, not the rounding of zero.
          self%speed(block) = 0.0_wp
-         if (abs(self%place(block) - start) > 0.0_wp) self%sense(block) = sign(1.0_wp, &
-            & self%place(block) - start)
+         moved = (self%place(block) - start) + (self%place_remainder(block) - remainder)
+         if (abs(moved) > 0.0_wp) sense = sign(1.0_wp, moved)
+         self%sense(block) = sense
       case (event_again, event_publish)
          asks = .false.
       case default
@@ -324,21 +329,6 @@ contains
          end associate
       end if
    end subroutine carry
-
-   !> Move a block, and keep what its displacement does not hold.
-   elemental subroutine add_exactly(place, remainder, displacement)
-      !> Displacement [m], and its part below rounding
-      real(wp), intent(inout) :: place
-      real(wp), intent(out) :: remainder
-      !> Increase, with the remainder before [m]
-      real(wp), intent(in) :: displacement
-
-      real(wp) :: before
-
-      before = place
-      place = before + displacement
-      remainder = displacement - (place - before)
-   end subroutine add_exactly
 
    !> Move all blocks that go on as published to the end of the step, with their books.
    subroutine carry_published(self)

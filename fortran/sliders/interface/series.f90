@@ -33,8 +33,9 @@ contains
          & + 2.0_wp * self%max_neighbours * self%viscosity
    end function rate_of
 
-   !> The shortest length of the step, from one on, whose end is a number. Otherwise the drive would
-   !> continue from a rounded time, and equal steps add work that no term of the energy has.
+   !> Shortest length, not below the given one, at which the end of the step is representable.
+   !> Otherwise the drive would continue from a rounded time, and equal steps add work that no term
+   !> of the energy has.
    pure function whole_length(self, length) result(whole)
       class(row_state_type), intent(in) :: self
       !> Length [s]

@@ -15,7 +15,7 @@ module mesoslip_sliders_interface_state
 
    public :: row_state_type, excess_type
    public :: block_values, busy_pace, quiet_pace, min_pace, min_order, rounding
-   public :: load_motion, motion_of_damper, neighbour_motion
+   public :: add_exactly, load_motion, motion_of_damper, neighbour_motion
 
    !> Message where memory has run out
    character(len=*), parameter :: no_memory = "not enough memory for the blocks"
@@ -69,7 +69,8 @@ module mesoslip_sliders_interface_state
       !> Displacement [m], velocity [m/s], half the acceleration [m/s2], and deceleration by the
       !> damper [m/s2] of each block, at its own time after the start of the step [s]
       real(wp), allocatable :: place(:), speed(:), bend(:), damper(:), moment(:)
-      !> Part of the displacement below its rounding [m]: of steps alike, each is rounded alike
+      !> Part of the displacement below its rounding [m]; without it equal steps would be rounded
+      !> equally
       real(wp), allocatable :: place_remainder(:)
       !> Sign of the last velocity that was not zero
       real(wp), allocatable :: sense(:)
@@ -265,6 +266,21 @@ contains
          damper(:order - 1) = self%published_damper(block, :order - 1)
       end if
    end function motion_of_damper
+
+   !> Move a block, and keep the rounding error of its displacement.
+   elemental subroutine add_exactly(place, remainder, displacement)
+      !> Displacement [m], and its part below rounding
+      real(wp), intent(inout) :: place
+      real(wp), intent(out) :: remainder
+      !> Increase, with the remainder before [m]
+      real(wp), intent(in) :: displacement
+
+      real(wp) :: before
+
+      before = place
+      place = before + displacement
+      remainder = displacement - (place - before)
+   end subroutine add_exactly
 
    !> Published motion of both neighbours of a block together.
    pure function neighbour_motion(self, block, order) result(around)

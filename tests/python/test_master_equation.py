@@ -290,6 +290,19 @@ def test_the_first_slip_of_klein(klein):
     assert max(errors) < 3
 
 
+def test_steps_of_narrow_thresholds_are_long_and_find_the_second_slip(klein):
+    """By contacts that attached in the first one, at a place for each step."""
+    runs = [
+        finish(klein(run__engine="me", run__duration=4.5, run__resolution=one))
+        for one in (0.5, 0.25, 0.125)
+    ]
+    times = np.array([one.slips[1][1] for one in runs])
+    assert abs(times[1] - times[2]) < 2e-6
+    assert abs(times[0] - times[2]) < 1e-4
+    # Steps by the resolution alone: 80 000, and a second slip that is off by 1e-4 s.
+    assert runs[1].advances < 40_000
+
+
 @pytest.mark.parametrize("engine_slider", [{}, PRESCRIBED])
 def test_contacts_are_conserved(klein, engine_slider):
     """Pinned and detached ones together are N, to rounding, after slips and reversals."""

@@ -215,6 +215,23 @@ def test_the_spread_of_an_irregular_motion_has_its_periods():
     assert found.spread == pytest.approx(np.std(durations[20:]) / np.mean(durations[20:]))
 
 
+@pytest.mark.parametrize(("factor", "is_far"), [(0.96, True), (1.0, False)])
+def test_the_error_of_a_slow_return_is_the_distance_to_its_limit(regular, factor, is_far):
+    """Of a cycle of three passages with a peak that deviates by less and less in each, or by as
+    much to both sides."""
+    run = _Settling(Motion(configuration()), None, None, 1e-5, 0.0)
+    cycles = np.arange(39) // 3
+    deviation = 1e-3 * factor**cycles * (1.0 if is_far else (-1.0) ** cycles)
+    run._rows = [
+        np.array([1.0, 2.0 + 0.1 * (one % 3) + deviation[one], 1.0]) for one in range(len(cycles))
+    ]
+    found = run.result("periodic", regular.state)
+    assert found.multiple == 3
+    amplitude = run._rows[-1][1] - run._rows[-1][2]
+    left = deviation[-1] / amplitude
+    assert found.error == pytest.approx(left, rel=0.3)
+
+
 def test_smooth_sliding_and_irregular_motion_are_told_apart():
     smooth = mesoslip.cycle(configuration("contacts.delay=0", LONG_STEPS))
     assert smooth.motion == "smooth"

@@ -28,7 +28,7 @@ module mesoslip_contacts_populations_pinned
    real(wp), parameter :: min_even = 0.02_wp
    !> Maximum length of a step in which the force hardly bends: over that by the resolution, over
    !> the spread of the breaking stretches, and over the resolution times the stretch in a life
-   real(wp), parameter :: max_growth = 4.0_wp, max_part = 0.9_wp, max_stretch_part = 0.03_wp
+   real(wp), parameter :: max_growth = 4.0_wp, max_part = 0.9_wp, max_stretch_part = 0.02_wp
    !> Distance of neighbouring populations over the sum of the displacements in which they attached,
    !> and maximum shift over the latter
    real(wp), parameter :: min_gap = 0.3_wp, max_gap = 0.7_wp, max_shift = 0.2_wp

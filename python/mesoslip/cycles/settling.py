@@ -22,17 +22,18 @@ from mesoslip.simulation.kernel import Words
 MAX_MULTIPLE = 4
 # Relative error of period and peaks at which a cycle is settled, and maximum number of cycles.
 TOLERANCE, MAX_CYCLES = 1e-5, 80
-# Changes over the tolerance in the last two cycles up to which one is settled: one change may be
-# small by accident.
-MAX_CHANGE = 10.0
+# Number of last cycles, and their changes over the tolerance up to which one is settled: two changes
+# may be small by accident.
+LAST_CYCLES, MAX_CHANGE = 3, 10.0
 # Relative spread of period and peaks over a number of last passages below which a motion that has
 # not settled is periodic: steps of the solver, or a fine structure, may keep it from settling.
 MAX_SPREAD, SPREAD_PASSAGES = 2e-3, 24
 # Passages in a later batch over those in the first one.
 BATCH_PART = 0.5
 # Ratio of successive changes below which they shrink; median of the changes in the last third of a
-# batch over that in the first third, below which its motion settles.
-SHRINKING, SETTLING = 0.98, 0.5
+# batch over that in the first third, below which its motion settles, and below which it may not
+# have reached its limit yet.
+SHRINKING, SETTLING, SLOWLY = 0.98, 0.5, 0.9
 # Ratios up to which spreads and changes of cycles of different lengths count as equal; the shorter
 # cycle is then chosen. A true cycle of several passages has much smaller ones than a shorter cycle.
 EQUAL_SPREAD, EQUAL_CHANGE = 3.0, 10.0
@@ -235,10 +236,10 @@ class _Settling:
         return words, self.level_of(trace), ""
 
     def _is_settled(self, multiple: int) -> bool:
-        """Whether the changes of the last two cycles of some passages are small."""
-        if len(self._rows) <= 2 * multiple:
+        """Whether the changes of the last cycles of some passages are small."""
+        if len(self._rows) <= LAST_CYCLES * multiple:
             return False
-        changes = self._differences(multiple)[-2 * multiple :]
+        changes = self._differences(multiple)[-LAST_CYCLES * multiple :]
         return float(np.max(np.abs(changes))) < MAX_CHANGE * self._tolerance
 
     def _may_settle(self) -> bool:
@@ -266,6 +267,15 @@ class _Settling:
                 found.append((multiple, spread))
         best = min(spread for _, spread in found)
         return next(one for one in found if one[1] <= EQUAL_SPREAD * best)
+
+    def _remaining(self, multiple: int) -> float:
+        """Distance to the limit of changes over a cycle that shrink slowly; 0 if they do not."""
+        sizes = np.max(np.abs(self._differences(multiple)), axis=1)
+        early, _, late = (float(np.median(one)) for one in np.array_split(sizes, 3))
+        if not late < SLOWLY * early:
+            return 0.0
+        factor = (late / early) ** (3 * multiple / (2 * len(sizes)))
+        return late * factor / (1 - factor)
 
     def _take(self, passage: Passage) -> None:
         self._recent = [*self._recent[1 - 2 * MAX_MULTIPLE :], passage]
@@ -334,6 +344,7 @@ class _Settling:
             multiple = 1
         elif error > self._tolerance:
             multiple, error = self._spread()
+            error = max(error, self._remaining(multiple))
         passages = self._recent[-multiple:] if motion == "periodic" else self._recent
         return Settled(
             motion,

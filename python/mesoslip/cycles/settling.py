@@ -22,8 +22,8 @@ from mesoslip.simulation.kernel import Words
 MAX_MULTIPLE = 4
 # Relative error of period and peaks at which a cycle is settled, and maximum number of cycles.
 TOLERANCE, MAX_CYCLES = 1e-5, 80
-# Number of last cycles, and their changes over the tolerance up to which one is settled: two changes
-# may be small by accident.
+# Number of last cycles, and their changes over the tolerance up to which one is settled: two
+# changes may be small by accident.
 LAST_CYCLES, MAX_CHANGE = 3, 10.0
 # Relative spread of period and peaks over a number of last passages below which a motion that has
 # not settled is periodic: steps of the solver, or a fine structure, may keep it from settling.

@@ -274,7 +274,7 @@ class _Settling:
         early, _, late = (float(np.median(one)) for one in np.array_split(sizes, 3))
         if not late < SLOWLY * early:
             return 0.0
-        factor = (late / early) ** (3 * multiple / (2 * len(sizes)))
+        factor = math.pow(late / early, 3 * multiple / (2 * len(sizes)))
         return late * factor / (1 - factor)
 
     def _take(self, passage: Passage) -> None:

@@ -107,7 +107,7 @@ class Plan:
         }
 
     def config(self, combination: int) -> Config:
-        """The configuration of a combination, made anew: 10⁶ of them would take 9 GB."""
+        """The configuration of a combination, made each time: 10⁶ of them would take 9 GB."""
         changes = {**self.values(combination), "run.realizations": 1}
         changes.pop(DIRECTION, None)
         merged = override(Merged(self.tables), [changes])

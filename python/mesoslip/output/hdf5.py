@@ -85,7 +85,7 @@ def _is_sound(heap: memoryview) -> bool:
 
 
 def _can_be_read(file: IO[bytes]) -> bool:
-    """Whether the library comes to an end with all that is in heaps, in a process of its own."""
+    """Whether the library can read all that is in heaps, tried in a process of its own."""
     code = "from mesoslip.output.hdf5 import read_heaps; read_heaps('/dev/stdin')"
     line = [sys.executable, "-P", "-c", code]
     quiet = subprocess.DEVNULL

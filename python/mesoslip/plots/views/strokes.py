@@ -71,7 +71,7 @@ def draw_loops(axes: Axes, found: Strokes) -> None:
             (1 - share) * one + share * two
             for one, two in zip((0, 0.27, 0.53), (0.73, 0.33, 0.4), strict=True)
         )
-        # Without a position, each begins anew at the left.
+        # Without a position, each begins at the left.
         gap = [] if record.position is not None else [np.nan]
         x = np.concatenate([[*place_of(record, one), *gap] for one in pairs[index]])
         y = np.concatenate([[*one.direction * along(record, one), *gap] for one in pairs[index]])

@@ -215,6 +215,18 @@ def test_the_spread_of_an_irregular_motion_has_its_periods():
     assert found.spread == pytest.approx(np.std(durations[20:]) / np.mean(durations[20:]))
 
 
+def test_two_small_changes_may_be_by_accident():
+    """Three passages of nearly one peak, before one that differs by fifty times their changes."""
+    run = _Settling(Motion(configuration()), None, None, 1e-5, 0.0)
+    peaks = [2.0, 2.00001, 2.000015, 2.0005, 2.00050001, 2.00050001, 2.00050001]
+    rows = [np.array([1.0, peak, 1.0]) for peak in peaks]
+    settled = []
+    for count in range(1, len(rows) + 1):
+        run._rows = rows[:count]
+        settled.append(run._is_settled(1))
+    assert settled == 6 * [False] + [True]
+
+
 @pytest.mark.parametrize(("factor", "is_far"), [(0.96, True), (1.0, False)])
 def test_the_error_of_a_slow_return_is_the_distance_to_its_limit(regular, factor, is_far):
     """Of a cycle of three passages with a peak that deviates by less and less in each, or by as

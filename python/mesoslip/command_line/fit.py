@@ -231,7 +231,7 @@ def check_arguments(traces: Sequence[Path], config: Path, predict: Path | None =
                     f"{config}: the fit {traces[0]} has its configuration; leave this one out: "
                     f"mesoslip fit {traces[0]} --predict {predict}"
                 )
-        # What is wrong with it is said before the fit.
+        # Errors in the trace are reported before the fit.
         files.read_run(predict)
 
 

@@ -98,13 +98,14 @@ def draw_fronts(axes: Axes, tree: Tree, picture: Picture, horizontal: Horizontal
     )
     fronts = picture.found.fronts
     chosen = np.flatnonzero((fronts["end_time"] >= low) & (fronts["start_time"] <= high))
+    labelled = int(np.isfinite(fronts["speed_ratio"][chosen]).sum()) <= MAX_SPEEDS
     for place, index in enumerate(chosen.tolist()):
         times = shown(np.array([fronts["start_time"][index], fronts["end_time"][index]]))
         ends = np.array([fronts["start_position"][index], fronts["end_position"][index]])
         label = "" if place else "front"
         axes.plot(times, ends / scale.size, color=RED, linestyle="-", linewidth=1.2, label=label)
         ratio = fronts["speed_ratio"][index]
-        if chosen.size <= MAX_SPEEDS and np.isfinite(ratio):
+        if labelled and np.isfinite(ratio):
             axes.annotate(
                 f"{number(float(ratio), 2)} c",
                 (times.mean(), ends.mean() / scale.size),

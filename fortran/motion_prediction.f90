@@ -185,7 +185,9 @@ contains
          step = step * (1.0_wp - excess * (1.0_wp - 2.0_wp * excess))
          growth = (rate + bend * step) * step
       else
-         if (abs(excess) < max_start_excess) step = step * (1.0_wp - excess)
+         if (abs(excess) < max_start_excess) then
+            step = step * (1.0_wp - excess * (1.0_wp - 2.0_wp * excess))
+         end if
          do number = 1, max_steps
             call ageing%grow(rate, age, step, growth, later_rate)
             slope = speed + (2.0_wp * pull + (3.0_wp * third + 4.0_wp * fourth * step) * step) &

@@ -108,7 +108,7 @@ contains
       class(ageing_contacts_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
 
-      integer :: number, position, contact(max_gathered)
+      integer :: number, added, position, contact(max_gathered)
       real(wp) :: last
 
       last = self%queue%first_key + max_gathered * self%stretch / self%parameters%count
@@ -117,17 +117,31 @@ contains
          call self%queue%pop(self%record, contact(number))
       end do
       number = number - 1
+      call self%count_visits(number)
+      added = 0
       do position = 1, number
          if (self%life(life_motion, contact(position)) < any_motion) then
             call self%solve(contact(position), pose%displacement, pose%time)
          end if
          if (self%ahead_of(contact(position)) <= last) then
-            call add_leader(self, contact(position))
+            added = added + 1
+            contact(added) = contact(position)
          else
             call self%put(contact(position))
          end if
       end do
-      call self%count_visits(number)
+      ! Most are beyond all leaders.
+      associate (list => self%list(leaders))
+         list%contact(added + 1:added + list%count) = list%contact(:list%count)
+         self%leader_key(added + 1:added + list%count) = self%leader_key(:list%count)
+         list%count = added + list%count
+         do position = 1, added
+            list%contact(added + 1 - position) = contact(position)
+            self%leader_key(added + 1 - position) = self%ahead_of(contact(position))
+            self%kept(contact(position)) = in_leaders
+         end do
+      end associate
+      call sort_leaders(self, 2)
    end subroutine gather
 
    !> Add a contact to the leaders, which are in decreasing order of their keys.

@@ -42,7 +42,8 @@ module mesoslip_ageing_law
       !> Growth of the law `log` for each e-fold of the age
       real(wp) :: growth = 0.0_wp
    contains
-      procedure, non_overridable :: evaluate, threshold, curvature, grow, configured, deficit
+      procedure, non_overridable :: evaluate, threshold, curvature, twist, is_cubic, grow, &
+         & configured, deficit
       procedure, non_overridable :: falls, acts, is_constant, is_old, newborn_threshold
    end type ageing_law_type
 
@@ -79,6 +80,31 @@ contains
       curvature = -rate * self%inverse_time
       if (self%kind == ageing_log) curvature = -rate / (self%time + age)
    end function curvature
+
+   !> Third coefficient of the growth of a threshold as a power series in the time [1/s3], given the
+   !> second one at an age.
+   elemental function twist(self, bend, age)
+      class(ageing_law_type), intent(in) :: self
+      real(wp), intent(in) :: bend, age
+      real(wp) :: twist
+
+      twist = -(1.0_wp / 3.0_wp) * bend * self%inverse_time
+      if (self%kind == ageing_log) twist = -(2.0_wp / 3.0_wp) * bend / (self%time + age)
+   end function twist
+
+   !> Whether these three coefficients are enough for a time [s] after an age, up to an error.
+   elemental function is_cubic(self, rate, age, time, max_error)
+      class(ageing_law_type), intent(in) :: self
+      real(wp), intent(in) :: rate, age, time, max_error
+      logical :: is_cubic
+
+      ! The fourth one is smaller for the law `relax`, whose ages do not matter.
+      if (self%kind == ageing_log) then
+         is_cubic = abs(rate) * time * time**3 <= 4.0_wp * max_error * (self%time + age)**3
+      else
+         is_cubic = abs(rate) * time * time**3 <= 24.0_wp * max_error * self%time**3
+      end if
+   end function is_cubic
 
    !> Growth of a threshold in a time [s] after an age, given its rate then, and its rate later.
    elemental subroutine grow(self, rate, age, time, growth, later_rate)

@@ -18,11 +18,15 @@ module mesoslip_motion_prediction
    real(wp), parameter :: safety = 4.0_wp, memory = 0.99_wp, min_jerk_error = 1.0e-3_wp
    !> Relative change of the speed of approach up to which the time of a break is a short series
    real(wp), parameter :: max_excess = 1.0e-5_wp
+   !> The same up to which one step of Newton's method follows that series
+   real(wp), parameter :: max_fair_excess = 5.0e-3_wp
    !> The same up to which that series starts Newton's method, and relative change of the time after
    !> which it ends: the error is the square of that
    real(wp), parameter :: max_start_excess = 0.2_wp, max_change = 1.0e-6_wp
    !> Steps of Newton's method: without convergence nothing is extrapolated
    integer, parameter :: max_steps = 8
+   !> Maximum phase of the oscillation of the slider in a window: more than it makes in one step
+   real(wp), parameter :: max_phase = 0.6_wp
    !> Maximum duration for which a bound on the displacement is extrapolated [s], and its
    !> margin, with which bounds beyond it do not change how the slider takes its step
    real(wp), parameter :: max_duration = 1.0e9_wp, margin = 2.5_wp
@@ -34,13 +38,15 @@ module mesoslip_motion_prediction
       !> Acceleration [m/s2] and jerk under it, the error of the jerk in recent motions, and a bound
       !> on its error [m/s3]
       real(wp) :: acceleration = 0.0_wp, jerk = 0.0_wp, jerk_error = 0.0_wp, jerk_bound = 0.0_wp
+      !> Square of the angular frequency under the law [1/s2]
+      real(wp) :: stiffness = 0.0_wp
       !> Whether the motion is known: then its next derivative [m/s4], and bounds on the two after
       !> it [m/s5, m/s6]
       logical :: is_known = .false.
       real(wp) :: snap = 0.0_wp, crackle_bound = 0.0_wp, pop_bound = 0.0_wp
    contains
-      procedure, non_overridable :: predict, complete, compare, reach, meet, extrapolate, shift, &
-         & exchange
+      procedure, non_overridable :: predict, complete, compare, limit_time, reach, meet, &
+         & extrapolate, shift, exchange
       procedure, non_overridable, private :: displacement_error
    end type prediction_type
 
@@ -68,6 +74,7 @@ contains
          & + min_jerk_error * abs(self%jerk) &
          & + pose%own_rate * (pose%own_rate * abs(pose%velocity) + abs(self%acceleration))
       self%is_known = pose%is_known
+      self%stiffness = stiffness
       damper_rate = pose%damping * (self%acceleration - pose%damper)
       self%snap = pose%driving_rate + pose%damping * damper_rate &
          & - stiffness * self%acceleration - loss * self%jerk
@@ -97,6 +104,19 @@ contains
       self%jerk_error = max(abs(after%acceleration - self%acceleration - self%jerk * duration) &
          & / duration, memory * self%jerk_error)
    end subroutine compare
+
+   !> End a window of a motion that is known, which is no shorter than the steps of the slider.
+   pure subroutine limit_time(self, pose, time)
+      class(prediction_type), intent(in) :: self
+      type(pose_type), intent(in) :: pose
+      !> The time at which it ends [s]
+      real(wp), intent(inout) :: time
+
+      if (.not. self%is_known) return
+      if (self%stiffness * min(time - pose%time, max_duration)**2 > max_phase**2) then
+         time = pose%time + max_phase / sqrt(self%stiffness)
+      end if
+   end subroutine limit_time
 
    !> Coordinate along a direction that the slider does not reach before a time.
    pure function reach(self, pose, direction, time) result(coordinate)
@@ -160,7 +180,8 @@ contains
       real(wp), intent(inout) :: growth
       logical, intent(out) :: is_known
 
-      real(wp) :: bend, pull, third, fourth, error, later_rate, step, excess, largest, slope, change
+      real(wp) :: bend, twist, pull, third, fourth, error, later_rate, step, excess, largest, &
+         & slope, change
       integer :: number
 
       is_known = .false.
@@ -184,6 +205,16 @@ contains
          & <= 0.1_wp * resolution * ageing%time) then
          step = step * (1.0_wp - excess * (1.0_wp - 2.0_wp * excess))
          growth = (rate + bend * step) * step
+      else if (largest <= max_fair_excess .and. ageing%is_cubic(rate, age, step, &
+         & 0.1_wp * resolution)) then
+         step = step * (1.0_wp - excess * (1.0_wp - 2.0_wp * excess))
+         twist = ageing%twist(bend, age)
+         later_rate = rate + (2.0_wp * bend + 3.0_wp * twist * step) * step
+         growth = (rate + (bend + twist * step) * step) * step
+         change = (gap + growth - step * (speed + (pull + (third + fourth * step) * step) &
+            & * step)) / (speed + (2.0_wp * pull + (3.0_wp * third + 4.0_wp * fourth * step) &
+            & * step) * step - later_rate)
+         growth = growth + later_rate * change
       else
          if (abs(excess) < max_start_excess) then
             step = step * (1.0_wp - excess * (1.0_wp - 2.0_wp * excess))

@@ -130,10 +130,10 @@ module mesoslip_schedule
       type(ageing_law_type) :: ageing
       type(prediction_type) :: prediction
       !> Distance to its threshold at which a contact breaks [m]; coordinate before which no contact
-      !> breaks that is not listed, and before which none does in the next step [m]; maximum
-      !> distance by which one broke too late [m]
+      !> breaks that is not listed, that before which none does in the next step [m], and the time
+      !> at which this ends [s]; maximum distance by which one broke too late [m]
       real(wp) :: resolution = 0.0_wp, unlisted = huge(1.0_wp), meeting = huge(1.0_wp), &
-         & lateness = 0.0_wp
+         & window_time = huge(1.0_wp), lateness = 0.0_wp
       !> Number of breaks as written; for each break its entry then: the order changes as thresholds
       !> grow. For each entry whether its threshold is constant; its stretch at the coordinate, its
       !> configured breaking stretch and the mean one [m], and the time of its birth [s]
@@ -185,7 +185,10 @@ contains
       stop = self%break_coordinate(self%broken + 1)
       window%end_time = min(self%attach_time(self%attached + 1), &
          & self%site_time(self%moved + 1), self%end_time, time + self%max_step)
-      if (self%has_growth) stop = self%meeting
+      if (self%has_growth) then
+         stop = self%meeting
+         window%end_time = min(window%end_time, self%window_time)
+      end if
       if (self%has_clocks) then
          if (self%turns_later(self%broken + 1)) then
             if (self%hazard%lets_turn_later(velocity)) then
@@ -465,8 +468,9 @@ contains
 
       if (.not. self%has_growth) return
       call self%prediction%predict(pose, self%law())
-      reach = self%prediction%reach(pose, self%direction, &
-         & min(self%attach_time(self%attached + 1), self%site_time(self%moved + 1)))
+      self%window_time = min(self%attach_time(self%attached + 1), self%site_time(self%moved + 1))
+      call self%prediction%limit_time(pose, self%window_time)
+      reach = self%prediction%reach(pose, self%direction, self%window_time)
       self%meeting = huge(1.0_wp)
       do event = self%broken + 1, self%breaks
          if (.not. self%break_coordinate(event) < min(self%meeting, reach)) exit

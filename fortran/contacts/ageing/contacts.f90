@@ -15,7 +15,8 @@
 module mesoslip_contacts_ageing_contacts
    use mesoslip_contacts_ageing_base, only: ageing_contacts_type, any_motion, falling, in_falling, &
       & in_leaders, in_queue, leaders, life_birth, life_length, life_limit, life_motion, near, &
-      & next_configured, next_length, next_speed, position_of, remove, tiny_gap
+      & next_configured, next_length, next_speed, no_motion, position_of, remove, &
+      & tiny_gap
    use mesoslip_contacts_ageing_falling, only: add_falling, bound_falling, break_falling, scan, &
       & scan_if_needed
    use mesoslip_contacts_ageing_law, only: take_ageing_law
@@ -139,7 +140,7 @@ contains
          upper = self%queue%first_key
       else
          call scan_if_needed(self, pose)
-         call bound_leaders(self, pose, end_time, upper)
+         call bound_leaders(self, pose, upper, end_time)
          call bound_falling(self, pose, upper, lower, end_time)
       end if
       window = self%window_between(lower, upper, end_time)
@@ -200,13 +201,10 @@ contains
       self%cost = 1.0_wp
       schedule%unlisted = self%queue%first_key
       associate (list => self%list(leaders))
-         number = min(limit, max_events, list%count)
-         if (list%count > number) then
-            schedule%unlisted = min(schedule%unlisted, self%leader_key(list%count - number))
-         end if
-         do event = 1, number
+         do event = 1, min(limit, max_events, list%count)
             associate (one => list%contact(list%count + 1 - event))
-               if (self%is_falling(one)) exit
+               if (self%is_falling(one) &
+                  & .or. self%leader_key(list%count + 1 - event) >= schedule%unlisted) exit
                self%listed(event) = one
                schedule%break_entry(event) = event
                schedule%break_coordinate(event) = self%leader_key(list%count + 1 - event)
@@ -218,9 +216,11 @@ contains
                schedule%entry_birth(event) = self%life(life_birth, one)
             end associate
          end do
-         if (event <= number) schedule%unlisted = self%leader_key(list%count + 1 - event)
+         number = event - 1
+         if (number < list%count) then
+            schedule%unlisted = min(schedule%unlisted, self%leader_key(list%count - number))
+         end if
       end associate
-      number = event - 1
       if (number == 0) return
       schedule%break_stiffness(:number) = self%parameters%stiffness
       schedule%break_drag(:number) = drag_of(self%parameters, self%parameters%stiffness)
@@ -234,8 +234,8 @@ contains
       schedule%ageing = self%ageing
       schedule%prediction = self%prediction
       schedule%resolution = tiny_gap * self%stretch
-      call self%list_attachments(min(limit, max_events, 2 * number + 4), pose%direction, &
-         & schedule, contact)
+      call self%list_attachments(min(limit, max_events, number + 4), pose%direction, schedule, &
+         & contact)
       call self%list_newborn(contact(:schedule%attachments), schedule%attach_limit)
       call self%list_births(self%listed(:number), 0, pose%direction, schedule)
       if (schedule%has_births) then
@@ -304,14 +304,15 @@ contains
       call self%attach_listed(schedule, contact)
       do event = 1, schedule%attached
          associate (one => contact(event), birth => schedule%attach_time(event))
-            self%life(life_birth, one) = birth
-            self%life(life_limit, one) = self%next(next_configured, one)
+            self%life(:, one) = [birth, self%next(next_configured, one), no_motion]
+            if (self%ageing%is_constant(self%life(life_limit, one), self%stretch)) then
+               self%life(life_motion, one) = any_motion
+            end if
             self%next(next_speed, one) = 0.0_wp
-            call self%solve(one, schedule%attach_displacement(event), birth)
             call self%put(one)
-            self%behind = max(self%behind, self%behind_at(one, birth))
          end associate
       end do
+      self%behind = schedule%behind
    end subroutine settle_growing
 
    !> Break all contacts that are due.

@@ -20,22 +20,25 @@ module mesoslip_contacts_ageing_leaders
 
    !> Contacts that are taken out of the queue together
    integer, parameter :: max_gathered = 16
+   !> Leaders before the queue that are enough for a schedule
+   integer, parameter :: enough = max_events - max_gathered
 
 contains
 
    !> Bound a window by the breaks of the leaders and of the queue.
-   subroutine bound_leaders(self, pose, end_time, upper)
+   subroutine bound_leaders(self, pose, upper, end_time)
       class(ageing_contacts_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
-      !> Latest end of the window [s]
-      real(wp), intent(in) :: end_time
-      !> Coordinate before which no contact breaks [m]
-      real(wp), intent(inout) :: upper
+      !> Coordinate before which no contact breaks [m], until a time [s]
+      real(wp), intent(inout) :: upper, end_time
 
       real(wp) :: reach
 
       reach = huge(1.0_wp)
-      if (.not. self%jumps) reach = self%prediction%reach(pose, self%direction, end_time)
+      if (.not. self%jumps) then
+         call self%prediction%limit_time(pose, end_time)
+         reach = self%prediction%reach(pose, self%direction, end_time)
+      end if
       do
          call extrapolate_first(self, pose, reach, upper)
          if (.not. self%queue%first_key < min(upper, reach)) exit
@@ -95,8 +98,8 @@ contains
       end if
       do while (self%queue%first_key < huge(1.0_wp))
          associate (count => self%list(leaders)%count)
-            if (count > max_events - max_gathered) then
-               if (self%leader_key(count - max_gathered + 1) <= self%queue%first_key) exit
+            if (count >= enough) then
+               if (self%leader_key(count - enough + 1) < self%queue%first_key) exit
             end if
          end associate
          call gather(self, pose)

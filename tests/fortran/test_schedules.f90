@@ -27,6 +27,8 @@ program test_schedules
    call runs_ahead("ageing", "rigid", "gaussian", 0.1_wp, 0.0_wp)
    call runs_ahead("ageing", "rigid", "exponential", 1.0_wp, 5.0e-4_wp)
    call runs_ahead("ageing", "prescribed", "exponential", 1.0_wp, 0.0_wp)
+   call runs_ahead("ageing loaded", "rigid", "gaussian", 0.1_wp, 5.0e-4_wp)
+   call runs_ahead("ageing loaded", "prescribed", "gaussian", 0.1_wp, 5.0e-4_wp)
    call runs_ahead("thermal", "rigid", "gaussian", 0.1_wp, 5.0e-4_wp)
    call runs_ahead("thermal", "rigid", "exponential", 1.0_wp, 0.0_wp)
    call runs_ahead("thermal cold", "rigid", "gaussian", 0.1_wp, 5.0e-4_wp)

@@ -79,6 +79,7 @@ contains
       call self%allocate_records(0, 0, error)
       if (.not. allocated(error)) call self%births%record_factors(self%parameters, error)
       if (allocated(error)) return
+      self%lists_sites = .not. (allocated(self%births%force) .or. common%strength%is_used)
       associate (count => common%count)
          allocate (self%life(life_length, count), source=0.0_wp, stat=stat)
          if (stat == 0) allocate (self%next(next_length, count), source=0.0_wp, stat=stat)
@@ -241,6 +242,7 @@ contains
       if (schedule%has_births) then
          call self%list_newborn(self%listed(:number), schedule%birth_limit)
       end if
+      call self%list_sites(min(limit, max_events), self%listed(:number), schedule)
       schedule%is_over = .false.
    end subroutine plan_growing
 
@@ -270,6 +272,7 @@ contains
          self%prediction%jerk_error = 0.0_wp
          call settle_steady(self, schedule)
       end if
+      call self%move_listed(schedule, pose)
       ! A contact that has just broken and attaches at once was not in the schedule.
       if (schedule%is_over) call self%attach_due(pose)
       self%detached_count = real(self%detached%count, wp)

@@ -180,6 +180,7 @@ contains
       call solve_listed(self, contact(:schedule%attachments), schedule%attach_limit)
       call self%list_births(self%listed(:number), 0, pose%direction, schedule)
       if (schedule%has_births) call solve_listed(self, self%listed(:number), schedule%birth_limit)
+      call self%list_sites(min(limit, max_events), self%listed(:number), schedule)
       schedule%is_over = .false.
    end subroutine plan_steady
 

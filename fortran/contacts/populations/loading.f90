@@ -72,7 +72,7 @@ contains
 
       real(wp) :: before(self%bins()), after(self%bins())
 
-      associate (low => self%edge(:self%bins()), high => self%edge(2:))
+      associate (low => self%edge(:size(before)), high => self%edge(2:))
          before = max(0.0_wp, min(self%share, high) - low)
          after = max(0.0_wp, min(share, high) - low)
       end associate

@@ -70,7 +70,7 @@ contains
       class(population_state_type), intent(inout) :: self
       real(wp), intent(in) :: share
 
-      real(wp) :: before(self%bins()), after(self%bins())
+      real(wp) :: before(size(self%edge) - 1), after(size(self%edge) - 1)
 
       associate (low => self%edge(:size(before)), high => self%edge(2:))
          before = max(0.0_wp, min(self%share, high) - low)

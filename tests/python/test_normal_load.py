@@ -410,7 +410,7 @@ def test_a_vibrating_load_has_no_steps():
 
 def test_reports_and_pictures_have_the_load():
     from mesoslip.plots.views.run import caption
-    from mesoslip.reports.method_paragraphs import feature_sentence
+    from mesoslip.reports.model_sentences import feature_sentence
 
     config = configuration("rigid", **VIBRATING)
     sentence = feature_sentence(config.contact_features["load"], "load", config)

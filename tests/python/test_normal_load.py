@@ -356,7 +356,9 @@ def steps_up_and_down():
 
 def test_the_response_to_a_step_is_direct_or_transient(steps_up_and_down, relaxed):
     """Up: all of it after sliding, with alpha = mu (1 - L/L')/ln(L'/L). Down: all of it at once."""
-    found = mesoslip.response(steps_up_and_down, fit=False)["load_steps"].to_dataset()
+    response = mesoslip.response(steps_up_and_down, fit=False)
+    assert "several normal forces" in response["steady"]["note"].item()
+    found = response["load_steps"].to_dataset()
     assert found["load_step_time"].values == pytest.approx([2e4, 4e4], abs=20)
     assert found["normal_force_after"].values == pytest.approx([1.5, 1.0])
     # Just after is the first sample, up to 10 s or a hundredth of a breaking stretch after.

@@ -1,7 +1,7 @@
 """Steps and vibrations of the normal load beside their closed forms: ``docs/normal-load.png``.
 
-Left, the ready run ``load-step`` with shorter stages: force and coefficient, with the force curve of
-relaxed contacts.
+Left, the ready run ``load-step`` with shorter stages: force and coefficient, with the force curve
+of relaxed contacts.
 Right, the ready run ``vibrating-load`` and its sweep, with the limits of fast and slow vibration.
 """
 

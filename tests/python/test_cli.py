@@ -392,6 +392,9 @@ json.dump(found, stdout)
         (["slips", "truncated.nc"], ["truncated.nc"]),
         (["run", "truncated.nc"], ["truncated.nc"]),
         (["slips", "good.nc", "--csv", "."], ["written"]),
+        (["response", "good.nc", "./good.nc"], ["./good.nc: is given twice"]),
+        (["trace", "a.csv", "b.csv", "a.csv"], ["a.csv: is given twice"]),
+        (["fit", "good.nc", "good.nc", "short.toml"], ["good.nc: is given twice"]),
     ],
 )
 def test_mistakes(arguments, words, damaged, command, monkeypatch):

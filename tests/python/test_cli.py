@@ -392,8 +392,8 @@ json.dump(found, stdout)
         (["slips", "truncated.nc"], ["truncated.nc"]),
         (["run", "truncated.nc"], ["truncated.nc"]),
         (["slips", "good.nc", "--csv", "."], ["written"]),
-        (["response", "good.nc", "./good.nc"], ["./good.nc: is given twice"]),
-        (["trace", "a.csv", "b.csv", "a.csv"], ["a.csv: is given twice"]),
+        (["response", "good.nc", "./good.nc"], ["good.nc: is given twice"]),
+        (["trace", "a.csv", "b.csv", "a.csv", "-o", "x.nc"], ["a.csv: is given twice"]),
         (["fit", "good.nc", "good.nc", "short.toml"], ["good.nc: is given twice"]),
     ],
 )

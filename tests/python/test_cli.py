@@ -394,7 +394,7 @@ json.dump(found, stdout)
         (["slips", "good.nc", "--csv", "."], ["written"]),
         (["response", "good.nc", "./good.nc"], ["good.nc: is given twice"]),
         (["trace", "a.csv", "b.csv", "a.csv", "-o", "x.nc"], ["a.csv: is given twice"]),
-        (["fit", "good.nc", "good.nc", "short.toml"], ["good.nc: is given twice"]),
+        (["fit", "good.nc", "good.nc", "short.toml", "-o", "x.nc"], ["good.nc: is given twice"]),
     ],
 )
 def test_mistakes(arguments, words, damaged, command, monkeypatch):

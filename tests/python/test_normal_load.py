@@ -259,6 +259,30 @@ def test_outputs_have_the_load_and_the_coefficient(tmp_path):
     assert {"normal_force", "friction_coefficient"} <= set(tree["slip_traces"].data_vars)
 
 
+def test_contacts_that_touch_or_separate_are_counted_before_a_run(tmp_path, command, monkeypatch):
+    """As often as the load passes the force of each; a run whose load changes for hours says so,
+    and populations do not follow contacts."""
+    for changes in (LOAD, VIBRATING):
+        config = configuration("rigid", **changes)
+        times = np.linspace(0, config.duration, 200_001)
+        path = np.abs(np.diff(config.pressing.force_at(times))).sum()
+        expected = config.contacts.count * path / config.pressing.normal_force
+        assert config.contact_kind.load_changes(config) == pytest.approx(expected, rel=0.02)
+    assert config.replace({"run.engine": "me"}).contact_kind.load_changes(config) == 0
+    path = tmp_path / "case.toml"
+    path.write_text(config.to_toml())
+    changes = config.contact_kind.load_changes(config)
+    printed = command("info", path)[1]
+    found = next(line for line in printed.splitlines() if line.startswith("load_changes"))
+    assert float(found.split()[1]) == pytest.approx(changes, rel=0.01)
+    # Two realizations take as long as is reported.
+    monkeypatch.setattr("mesoslip.command_line.run.LONG", 1.5e-7 * changes)
+    for count in (1, 2):
+        more = ("-o", tmp_path / "run.nc", "--set", f"run.realizations={count}")
+        said = f"contacts will touch or separate about {count * changes:.1g} times"
+        assert (said in command("run", path, *more)[2]) == (count == 2)
+
+
 def test_loads_at_times():
     stages = Load.model_validate(LOAD["load"])
     times = [0.0, 0.01, 0.03, 0.05, 0.07, 0.072, 0.075, 0.1, 0.2]

@@ -427,6 +427,9 @@ def test_revolutions_of_a_disc() -> None:
     assert "groups of 4 revolutions" in found.attrs["notes"]
     with pytest.raises(mesoslip.FileError, match="whole revolutions"):
         mesoslip.strokes(record_tree(time[::300], force[::300], revolutions=0.8 * time[::300]))
+    for period in (1e-30, 0.0199):
+        with pytest.raises(mesoslip.FileError, match="shorter than two samples, 20 ms"):
+            mesoslip.strokes(record_tree(time, force), period=period)
 
 
 def test_falls_of_the_track_of_a_disc_are_no_slips(tmp_path) -> None:  # type: ignore[no-untyped-def]

@@ -174,15 +174,16 @@ class Side:
         lows = np.concatenate([[np.argmin(force[: tops[0] + 1])], bottoms[:-1]])
         # A fall, and the rise before it, begin and end within a part.
         part = np.searchsorted(self.parts.first, tops, side="right")
-        start, after = self.parts.first[part - 1], np.append(self.parts.first, force.size)[part]
-        kept = (tops > start) & (bottoms < after)
+        after = np.append(self.parts.first, force.size)[part]
+        lows = np.maximum(lows, self.parts.first[part - 1])
+        kept = (force[lows] < force[tops]) & (bottoms < after)
         if self.parts.are_late:
             last = np.flatnonzero(kept & (np.append(tops[1:], force.size) >= after))
             kept[last] = [
                 force[bottoms[one] : after[one]].max() > force[bottoms[one]] + self.floor / 2
                 for one in last.tolist()
             ]
-        tops, bottoms, lows = tops[kept], bottoms[kept], np.maximum(lows, start)[kept]
+        tops, bottoms, lows = tops[kept], bottoms[kept], lows[kept]
         self._ratios.add(tops, bottoms, lows)
         depth = force[tops] - force[bottoms]
         return tops, bottoms, depth - MIN_FALL_RATIO * self._rebounds(lows, tops, bottoms)

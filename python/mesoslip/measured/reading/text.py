@@ -502,19 +502,18 @@ class _Body:
 
 def _is_blank(data: NDArray[np.uint8]) -> NDArray[np.bool]:
     """Which bytes are between cells, or lines, of a table with blanks between its cells."""
-    return (data == ord(" ")) | (data == ord("\t")) | (data == NEWLINE)
+    is_blank: NDArray[np.bool] = (data == ord(" ")) | (data == ord("\t")) | (data == NEWLINE)
+    return is_blank
 
 
 def _inner(data: NDArray[np.uint8], first: Numbers, after: Numbers) -> tuple[Numbers, Numbers]:
     """Where cells begin and end without the blanks and the quotes around them."""
 
-    def is_around(at: Numbers) -> NDArray[np.bool]:
-        return (first < after) & ((data[at] == ord(" ")) | (data[at] == ord('"')))
-
+    is_around = (data == ord(" ")) | (data == ord('"'))
     first, after = first.copy(), after.copy()
-    while (outside := is_around(first)).any():
+    while (outside := (first < after) & is_around[first]).any():
         first[outside] += 1
-    while (outside := is_around(after - 1)).any():
+    while (outside := (first < after) & is_around[after - 1]).any():
         after[outside] -= 1
     return first, after
 

@@ -125,7 +125,7 @@ contains
          step_time = motion%time
          start_displacement = motion%displacement
          law = schedule%law()
-         window = schedule%window(motion%time, motion%velocity)
+         window = schedule%window(motion%time)
          system%stiffness = system%spring + law%stiffness * system%inverse_mass
          system%drag = law%drag * system%inverse_mass
          step%drive_gap = drive_gap_at(self, motion)

@@ -126,7 +126,8 @@ module mesoslip_schedule
       !> Let sites touch or separate. By dispatch, because a copy of it in pass would keep that from
       !> being inlined into the loops of sliders.
       procedure, private :: follow_load
-      procedure, non_overridable, private :: pass_clocks, break_with_clocks, attach_with_clocks, &
+      procedure, non_overridable, private :: pass_clocks, break_by_clock, &
+         & pass_coordinate, break_with_clocks, attach_with_clocks, &
          & change_sign, cut_lists, skip_gone
    end type schedule_type
 
@@ -379,34 +380,14 @@ contains
 
       earlier = self%came_count
       other = clocks + 1 - self%number
-      do while (self%clock_broken < self%clock_breaks)
-         associate (event => self%clock_broken + 1)
-            if (event == self%clock_stop &
-               & .or. self%clock_key(event) > self%hazard%reading(self%number)) exit
-            call self%break_with_clocks(time, displacement, -event, self%clock_origin(event))
-            if (self%clock_twin(event) > 0) self%break_gone(self%clock_twin(event)) = .true.
-         end associate
-         self%clock_broken = self%clock_broken + 1
-      end do
-      call self%skip_gone()
-      do while (self%broken < self%breaks)
-         associate (event => self%broken + 1)
-            if (self%break_coordinate(event) > self%direction * displacement) exit
-            if (self%break_turns(event)) then
-               ! Contacts of the other clock break first.
-               if (self%hazard%reading(other) >= self%hazard%next(other)) then
-                  self%is_over = .true.
-                  exit
-               end if
-               call self%change_sign(event)
-            else
-               call self%break_with_clocks(time, displacement, event, self%break_origin(event))
-               if (self%break_twin(event) > 0) self%clock_gone(self%break_twin(event)) = .true.
-            end if
-         end associate
-         self%broken = self%broken + 1
-         call self%skip_gone()
-      end do
+      if (self%clock_key(self%clock_broken + 1) <= self%hazard%reading(self%number)) then
+         call self%break_by_clock(time, displacement)
+      end if
+      if (self%broken < self%breaks) then
+         if (self%break_coordinate(self%broken + 1) <= self%direction * displacement) then
+            call self%pass_coordinate(time, displacement)
+         end if
+      end if
       self%breaks_now = self%came_count > earlier
       if (self%breaks_now) self%moments = self%moments + 1
 
@@ -430,6 +411,52 @@ contains
       end if
       self%hazard%next(self%number) = self%clock_key(self%clock_broken + 1)
    end subroutine pass_clocks
+
+   !> Break the contacts whose keys the clock has reached.
+   subroutine break_by_clock(self, time, displacement)
+      class(schedule_type), intent(inout) :: self
+      real(wp), intent(in) :: time, displacement
+
+      do while (self%clock_broken < self%clock_breaks)
+         associate (event => self%clock_broken + 1)
+            if (event == self%clock_stop &
+               & .or. self%clock_key(event) > self%hazard%reading(self%number)) exit
+            call self%break_with_clocks(time, displacement, -event, self%clock_origin(event))
+            if (self%clock_twin(event) > 0) self%break_gone(self%clock_twin(event)) = .true.
+         end associate
+         self%clock_broken = self%clock_broken + 1
+      end do
+      call self%skip_gone()
+   end subroutine break_by_clock
+
+   !> Break the contacts that have reached their thresholds, and move those to the other clock whose
+   !> forces have changed their sign.
+   subroutine pass_coordinate(self, time, displacement)
+      class(schedule_type), intent(inout) :: self
+      real(wp), intent(in) :: time, displacement
+
+      integer :: other
+
+      other = clocks + 1 - self%number
+      do while (self%broken < self%breaks)
+         associate (event => self%broken + 1)
+            if (self%break_coordinate(event) > self%direction * displacement) exit
+            if (self%break_turns(event)) then
+               ! Contacts of the other clock break first.
+               if (self%hazard%reading(other) >= self%hazard%next(other)) then
+                  self%is_over = .true.
+                  exit
+               end if
+               call self%change_sign(event)
+            else
+               call self%break_with_clocks(time, displacement, event, self%break_origin(event))
+               if (self%break_twin(event) > 0) self%clock_gone(self%break_twin(event)) = .true.
+            end if
+         end associate
+         self%broken = self%broken + 1
+         call self%skip_gone()
+      end do
+   end subroutine pass_coordinate
 
    !> Break a contact.
    subroutine break_with_clocks(self, time, displacement, entry, origin)

@@ -35,6 +35,8 @@ if TYPE_CHECKING:
 INTERRUPTED = 130
 # Expected size of an output that is reported before the run [bytes].
 LARGE = 5e8
+# Expected time of changes of the load that is reported before the run [s].
+LONG = 60.0
 # Rows of the trace that are read at once.
 MAX_ROWS = 400_000
 
@@ -68,6 +70,7 @@ def run(
     A checkpoint is written beside the output, as NAME.checkpoint, every minute and when the run is
     stopped by Ctrl-C, SIGTERM or SIGHUP. The same command with --resume continues from it.
     """
+    from mesoslip.configuration.contacts.base import LOAD_CHANGE_SECONDS
     from mesoslip.output import files, targets, writing
     from mesoslip.simulation.checkpoint import Checkpoint, checkpoint_folder
     from mesoslip.simulation.memory import check_memory, output_bytes
@@ -92,6 +95,12 @@ def run(
         report(
             f"the output will take about {expected / 1e9:.2g} GB; output.interval and "
             "output.slip_interval set how fine it is"
+        )
+    touches = checked.run.realizations * checked.contact_kind.load_changes(checked)
+    if not quiet and touches * LOAD_CHANGE_SECONDS > LONG:
+        report(
+            f"contacts will touch or separate about {touches:.1g} times as the load changes, which "
+            f"takes some {touches * LOAD_CHANGE_SECONDS:.1g} s of processor time"
         )
     folder = checkpoint_folder(path)
     with (

@@ -180,6 +180,7 @@ ROOT = Group(
     slip_time_error=Meaning(
         "s", "estimated error of the time at which a slip starts, maximum over all slips"
     ),
+    resolution=Meaning("1", "resolution of the master equation"),
     energy_residual=Meaning(
         "1", "residual of the energy balance over the work of the drive, forth and back"
     ),

@@ -35,8 +35,8 @@ NAMES = {
     "|pr fzeit|pruefzeit|time 1 default sample rate",
     "force": "force|spring force|shear force|shear load|friction force|frictional force"
     "|lateral force|tangential force|horizontal force|pulling force|traction force|drive force"
-    "|driving force|kraft|reibkraft|ft|f t|ff|f f|fx|f x|f|fs|force x|force t|force tangential"
-    "|horizontal load|force de frottement|force tangentielle",
+    "|driving force|kraft|reibkraft|standardkraft|ft|f t|ff|f f|fx|f x|f|fs|force x|force t"
+    "|force tangential|horizontal load|force de frottement|force tangentielle",
     "shear_stress": "shear|shear stress|shearstress|tau|τ|shear strs|stress shear",
     "friction": "friction|friction coefficient|coefficient of friction|friction coeff"
     "|friction coef|coef of friction|coeff of friction|cof|mu|f mg|f over mg|f over n|f fn"

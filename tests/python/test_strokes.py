@@ -512,6 +512,10 @@ def test_the_period_of_revolutions_is_found() -> None:
     assert found_period(np.arange(0, 200, 0.02), wave) == pytest.approx(1 / 1.99, rel=1e-4)
     found = strokes_of(record_tree(time, force), period="auto")
     assert found.notes[0].startswith("guess: a revolution takes 923")
+    # A running-in is larger than what repeats itself.
+    worn = force + 3 * np.ptp(force) * np.exp(-time / (0.1 * time[-1]))
+    found = strokes_of(record_tree(time, worn), period="auto")
+    assert found.notes[0].startswith("guess: a revolution takes 92")
     with pytest.raises(mesoslip.FileError, match="does not repeat"):
         mesoslip.strokes(record_tree(time, rng.standard_normal(time.size)), period="auto")
 

@@ -23,6 +23,7 @@ QUANTITIES = {
     "torque": "N*m",
     "radius": "m",
     "sliding_speed": "m/s",
+    "viscosity": "Pa*s",
     "acoustic_emission": "V",
 }
 # A displacement, of the load point or of the slider.
@@ -61,6 +62,7 @@ NAMES = {
     "|turns",
     "rotation_speed": "rotation speed|rotational speed|speed of rotation|spindle speed"
     "|rotation frequency|rpm|drehzahl|angular velocity|angular speed",
+    "viscosity": "viscosity|dynamic viscosity|viskosit t|viscosit|viscosidad|eta",
     "acoustic_emission": "acoustic emission|ae|ae rms|ae signal|acoustic|acoustic signal|trigger"
     "|piezo|hydrophone|microphone",
     "torque": "torque|friction torque|frictional torque|moment|drehmoment|reibmoment|mz|tz",

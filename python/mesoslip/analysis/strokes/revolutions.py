@@ -72,7 +72,8 @@ def revolutions_of(
         )
     noun = "revolutions" if each == 1 else f"groups of {each} revolutions"
     record = record_in(tree, realization, pieces, source, noun, tuple(remarks))
-    rows = [_row(record, one) for one in pieces[1:-1] if one.size > 1]
+    track = _of_track(record, angle) if each == 1 else np.zeros_like(angle)
+    rows = [_row(record, one, track[one.samples]) for one in pieces[1:-1] if one.size > 1]
     return record, rows, [_as_cycle(one) for one in rows]
 
 
@@ -183,10 +184,24 @@ def are_of_track(slips: FoundSlips, time: Array, angle: Array) -> bool:
     return False
 
 
-def _row(record: StrokeRecord, piece: Piece) -> Stroke:
-    """The friction of a row, which has neither ends nor a reversal."""
+def _of_track(record: StrokeRecord, angle: Array) -> Array:
+    """The part of the force along the motion that is the same in every revolution, of mean zero."""
+    part = np.floor((angle % 1) * MIN_SAMPLES).astype(int) % MIN_SAMPLES
+    sums, counts = np.zeros(MIN_SAMPLES), np.zeros(MIN_SAMPLES)
+    for one in record.pieces[1:-1]:
+        along = record.sign * record.force[one.samples]
+        sums += np.bincount(part[one.samples], along - along.mean(), MIN_SAMPLES)
+        counts += np.bincount(part[one.samples], minlength=MIN_SAMPLES)
+    means = sums / np.maximum(counts, 1)
+    middles = (np.arange(MIN_SAMPLES) + 0.5) / MIN_SAMPLES
+    return np.interp(angle % 1, middles, means - means.mean(), period=1)
+
+
+def _row(record: StrokeRecord, piece: Piece, track: Array) -> Stroke:
+    """The friction of a row, which has neither ends nor a reversal; the part of the track, which
+    averages out, is no error of its mean."""
     time, along = record.time[piece.samples], record.sign * record.force[piece.samples]
-    friction = mean_of(record, along)
+    friction = mean_of(record, along - track)
     coefficient = Measured()
     if record.normal is not None:
         coefficient = friction.over(float(record.normal[piece.samples].mean()))

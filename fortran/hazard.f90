@@ -22,6 +22,12 @@ module mesoslip_hazard
    !> reading lose digits accordingly
    real(wp), parameter :: max_fall = 8.0_wp
 
+   !> Rate of breaking that is negligible [1/s]: one in 300 000 years
+   real(wp), parameter :: negligible_rate = 1.0e-13_wp
+   !> Stretch over the mean breaking stretch at which the sign of a force changes: negligible, but
+   !> larger than rounding errors; and maximum stretch at which it may count as changed, over that
+   !> at breaking
+   real(wp), parameter :: tiny_stretch = 1.0e-12_wp, max_turn_ratio = 0.9_wp
    !> Hazard that is negligible: it is below the rounding of a deviate
    real(wp), parameter :: negligible = 1.0e-16_wp
    !> Maximum exponent of the rate of a contact whose force changed its sign, over that without a
@@ -42,6 +48,9 @@ module mesoslip_hazard
          & max_exponent(clocks) = 0.0_wp
       !> Reading at which the next contact breaks [s]
       real(wp) :: next(clocks) = never
+      !> Stretch of a contact by which it stays in its clock after its force has changed its sign:
+      !> minimum [m], and how far that is from breaking otherwise, where its rate is negligible [m]
+      real(wp) :: min_turn = 0.0_wp, quiet_distance = huge(1.0_wp)
       !> For forces that change their sign: maximum distance from there to where they are changed
       !> [m], minimum stretch at the threshold of such contacts [m], and maximum duration of the
       !> motion [s]
@@ -56,8 +65,11 @@ module mesoslip_hazard
       !> Exponent of the factor between a deviate and the increase of the clock, the key of a
       !> contact, and its remaining deviate
       procedure, non_overridable :: life_exponent, key, left
-      !> For forces that change their sign: where and how long their hazard is negligible, and
-      !> whether a motion is fast enough that they need no step of their own
+      !> For forces that change their sign: stretch at which a contact moves to the other clock,
+      !> which may be larger where its rate is negligible
+      procedure, non_overridable :: turn_stretch, delay_turns
+      !> Where and how long their hazard is negligible, and whether a motion is fast enough that they
+      !> need no step of their own
       procedure, non_overridable :: limit_turns, lets_turn_later
    end type hazard_type
 
@@ -158,6 +170,24 @@ contains
       exponent = self%slope * (limit + force_sign(number) * (origin - self%reference(number)))
    end function life_exponent
 
+   !> Stretch at which a contact whose force has changed its sign moves to the other clock [m].
+   pure function turn_stretch(self, limit) result(stretch)
+      class(hazard_type), intent(in) :: self
+      !> Stretch at the threshold [m]
+      real(wp), intent(in) :: limit
+      real(wp) :: stretch
+
+      stretch = max(self%min_turn, min(limit - self%quiet_distance, max_turn_ratio * limit))
+   end function turn_stretch
+
+   !> Let contacts stay in their clocks as long as their rates are negligible in both. A slider that
+   !> rings moves most of them to and fro in this range.
+   pure subroutine delay_turns(self)
+      class(hazard_type), intent(inout) :: self
+
+      self%quiet_distance = log(max(1.0_wp, self%rate / negligible_rate)) / self%slope
+   end subroutine delay_turns
+
    !> Set where and how long it makes no difference when a force changes its sign: the contact does
    !> not reach its threshold, and its hazard until then is negligible.
    pure subroutine limit_turns(self, stretch)
@@ -165,6 +195,7 @@ contains
       !> Mean stretch at the threshold [m]
       real(wp), intent(in) :: stretch
 
+      self%min_turn = tiny_stretch * stretch
       self%turn_limit = min_turn_threshold * stretch
       ! Less than the distance to their thresholds.
       self%turn_distance = min(max_turn_exponent / self%slope, max_turn_force * self%turn_limit)

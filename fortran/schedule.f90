@@ -17,12 +17,10 @@ module mesoslip_schedule
    implicit none
    private
 
-   public :: schedule_type, max_events, max_turns
+   public :: schedule_type, max_events
 
    !> Maximum number of breaks, and of attachments, in a schedule
    integer, parameter :: max_events = 64
-   !> Maximum number of contacts whose forces change their sign in a step without ending it
-   integer, parameter :: max_turns = 8
 
    !> Coming and past events.
    type :: schedule_type
@@ -103,9 +101,8 @@ module mesoslip_schedule
       logical :: break_gone(max_events) = .false., clock_gone(max_events) = .false.
       !> For each entry by coordinate whether the contact does not break there, but its force gets
       !> the sign of the motion; its stretch at breaking [m], its remaining deviate, and its reading
-      !> [s], by the other clock before that and by this one after it. Whether its hazard is
-      !> negligible where that happens, so that the step need not end there
-      logical :: break_turns(max_events) = .false., turns_later(max_events) = .false.
+      !> [s], by the other clock before that and by this one after it
+      logical :: break_turns(max_events) = .false.
       real(wp) :: turn_limit(max_events) = 0.0_wp, turn_left(max_events) = 0.0_wp, &
          & turn_key(max_events) = 0.0_wp
       !> Past changes of sign; contacts of the other clock, and the entry of the first of them to
@@ -115,10 +112,8 @@ module mesoslip_schedule
       integer :: came_count = 0, came(2 * max_events) = 0
       !> Whether contacts broke in the last step
       logical :: breaks_now = .false.
-      !> For each attachment the deviate, and the reading at which the contact breaks [s]; distance
-      !> from the origin at which the force of a contact changes its sign in backward motion [m]
-      real(wp) :: attach_left(max_events) = 0.0_wp, attach_key(max_events) = 0.0_wp, &
-         & tiny_stretch = 0.0_wp
+      !> For each attachment the deviate, and the reading at which the contact breaks [s]
+      real(wp) :: attach_left(max_events) = 0.0_wp, attach_key(max_events) = 0.0_wp
    contains
       !> Contact force until the next event, and the window until then
       procedure, non_overridable :: law, window
@@ -131,10 +126,9 @@ module mesoslip_schedule
       !> Let sites touch or separate. By dispatch, because a copy of it in pass would keep that from
       !> being inlined into the loops of sliders.
       procedure, private :: follow_load
-      !> Whether the end of the next step is known
-      procedure, non_overridable :: knows_stop
-      procedure, non_overridable, private :: pass_clocks, break_with_clocks, attach_with_clocks, &
-         & change_sign, cut_lists, skip_gone, find_stop
+      procedure, non_overridable, private :: pass_clocks, break_by_clock, &
+         & pass_coordinate, break_with_clocks, attach_with_clocks, &
+         & change_sign, cut_lists, skip_gone
    end type schedule_type
 
 contains
@@ -150,69 +144,23 @@ contains
    end function law
 
    !> Window until the next event, before the end of the schedule.
-   pure function window(self, time, velocity)
+   pure function window(self, time)
       class(schedule_type), intent(in) :: self
-      !> Time now [s], and velocity [m/s]
-      real(wp), intent(in) :: time, velocity
+      !> Time now [s]
+      real(wp), intent(in) :: time
       type(window_type) :: window
 
-      real(wp) :: stop
-
-      stop = self%break_coordinate(self%broken + 1)
       window%end_time = min(self%attach_time(self%attached + 1), &
          & self%site_time(self%moved + 1), self%end_time, time + self%max_step)
-      if (self%has_clocks) then
-         if (self%turns_later(self%broken + 1)) then
-            if (self%hazard%lets_turn_later(velocity)) then
-               call self%find_stop(stop)
-               window%end_time = min(window%end_time, time + self%hazard%turn_duration)
-            end if
-         end if
-      end if
       if (self%direction > 0.0_wp) then
-         window%upper = stop
+         window%upper = self%break_coordinate(self%broken + 1)
          window%lower = self%behind
       else
          window%upper = -self%behind
-         window%lower = -stop
+         window%lower = -self%break_coordinate(self%broken + 1)
       end if
       if (self%has_clocks) call self%hazard%limit_window(window)
    end function window
-
-   !> Coordinate up to which forces change their sign without a step of their own; huge if it is not
-   !> known. The same rule as find_ahead of contacts with clocks, so that results agree to the bit.
-   pure subroutine find_stop(self, stop)
-      class(schedule_type), intent(in) :: self
-      !> The coordinate [m]
-      real(wp), intent(out) :: stop
-
-      integer :: event, turns
-
-      turns = 0
-      stop = huge(1.0_wp)
-      do event = self%broken + 1, self%breaks
-         if (self%break_gone(event)) cycle
-         stop = min(self%break_coordinate(event), &
-            & self%break_coordinate(self%broken + 1) + self%hazard%turn_distance)
-         if (stop < self%break_coordinate(event) .or. turns == max_turns &
-            & .or. .not. self%turns_later(event)) return
-         turns = turns + 1
-      end do
-      stop = huge(1.0_wp)
-   end subroutine find_stop
-
-   !> Whether it is known where the next step ends at the latest.
-   pure function knows_stop(self)
-      class(schedule_type), intent(in) :: self
-      logical :: knows_stop
-
-      real(wp) :: stop
-
-      knows_stop = .true.
-      if (.not. self%turns_later(self%broken + 1)) return
-      call self%find_stop(stop)
-      knows_stop = stop < huge(1.0_wp)
-   end function knows_stop
 
    !> Number of contacts that broke.
    pure function break_count(self) result(number)
@@ -432,6 +380,43 @@ contains
 
       earlier = self%came_count
       other = clocks + 1 - self%number
+      if (self%clock_key(self%clock_broken + 1) <= self%hazard%reading(self%number)) then
+         call self%break_by_clock(time, displacement)
+      end if
+      if (self%broken < self%breaks) then
+         if (self%break_coordinate(self%broken + 1) <= self%direction * displacement) then
+            call self%pass_coordinate(time, displacement)
+         end if
+      end if
+      self%breaks_now = self%came_count > earlier
+      if (self%breaks_now) self%moments = self%moments + 1
+
+      call self%hazard%is_far(self%number, displacement, far(self%number))
+      far(other) = .false.
+      if (self%hazard%is_used(other)) then
+         call self%hazard%is_far(other, displacement, far(other))
+         far(other) = far(other) .or. self%hazard%reading(other) >= self%hazard%next(other)
+      end if
+      self%is_over = self%is_over .or. any(far) .or. time >= self%end_time &
+         & .or. abs(displacement) * self%mean_stiffness >= self%max_force &
+         & .or. self%broken == self%breaks .or. self%clock_broken == self%clock_breaks &
+         & .or. self%pinned == self%others
+      if (self%is_over) return
+      if (self%attach_time(self%attached + 1) <= time) then
+         if (allocated(self%strength)) call self%fit_to_track(time, displacement)
+         call self%attach_with_clocks(time, displacement)
+         self%is_over = self%broken == self%breaks .or. self%clock_broken == self%clock_breaks &
+            & .or. self%attach_time(self%attached + 1) <= time
+         if (self%is_over) return
+      end if
+      self%hazard%next(self%number) = self%clock_key(self%clock_broken + 1)
+   end subroutine pass_clocks
+
+   !> Break the contacts whose keys the clock has reached.
+   subroutine break_by_clock(self, time, displacement)
+      class(schedule_type), intent(inout) :: self
+      real(wp), intent(in) :: time, displacement
+
       do while (self%clock_broken < self%clock_breaks)
          associate (event => self%clock_broken + 1)
             if (event == self%clock_stop &
@@ -442,6 +427,17 @@ contains
          self%clock_broken = self%clock_broken + 1
       end do
       call self%skip_gone()
+   end subroutine break_by_clock
+
+   !> Break the contacts that have reached their thresholds, and move those to the other clock whose
+   !> forces have changed their sign.
+   subroutine pass_coordinate(self, time, displacement)
+      class(schedule_type), intent(inout) :: self
+      real(wp), intent(in) :: time, displacement
+
+      integer :: other
+
+      other = clocks + 1 - self%number
       do while (self%broken < self%breaks)
          associate (event => self%broken + 1)
             if (self%break_coordinate(event) > self%direction * displacement) exit
@@ -460,33 +456,7 @@ contains
          self%broken = self%broken + 1
          call self%skip_gone()
       end do
-      self%breaks_now = self%came_count > earlier
-      if (self%breaks_now) self%moments = self%moments + 1
-
-      call self%hazard%is_far(self%number, displacement, far(self%number))
-      far(other) = .false.
-      if (self%hazard%is_used(other)) then
-         call self%hazard%is_far(other, displacement, far(other))
-         far(other) = far(other) .or. self%hazard%reading(other) >= self%hazard%next(other)
-      end if
-      self%is_over = self%is_over .or. any(far) .or. time >= self%end_time &
-         & .or. abs(displacement) * self%mean_stiffness >= self%max_force &
-         & .or. self%broken == self%breaks .or. self%clock_broken == self%clock_breaks &
-         & .or. self%pinned == self%others
-      if (self%is_over) return
-      self%is_over = .not. self%knows_stop()
-      if (self%is_over) return
-      if (self%attach_time(self%attached + 1) <= time) then
-         if (allocated(self%strength)) call self%fit_to_track(time, displacement)
-         call self%attach_with_clocks(time, displacement)
-         self%is_over = self%broken == self%breaks .or. self%clock_broken == self%clock_breaks &
-            & .or. self%attach_time(self%attached + 1) <= time
-         if (self%is_over) return
-         self%is_over = .not. self%knows_stop()
-         if (self%is_over) return
-      end if
-      self%hazard%next(self%number) = self%clock_key(self%clock_broken + 1)
-   end subroutine pass_clocks
+   end subroutine pass_coordinate
 
    !> Break a contact.
    subroutine break_with_clocks(self, time, displacement, entry, origin)
@@ -588,7 +558,7 @@ contains
 
       real(wp) :: ahead
 
-      self%behind = max(self%behind, self%direction * origin - self%tiny_stretch)
+      self%behind = max(self%behind, self%direction * origin - self%hazard%turn_stretch(limit))
       ahead = self%direction * origin + limit
       do while (self%breaks > self%broken)
          if (self%break_coordinate(self%breaks) < ahead) exit

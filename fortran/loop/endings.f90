@@ -77,10 +77,6 @@ contains
             schedule%breaks = schedule%breaks - 1
          end do
          schedule%is_over = schedule%breaks == 0
-         ! The remaining ones may not bound a step.
-         if (schedule%has_clocks .and. .not. schedule%is_over) then
-            schedule%is_over = .not. schedule%knows_stop()
-         end if
       else
          schedule%behind = max(schedule%behind, schedule%direction * displacement)
       end if

@@ -16,6 +16,8 @@ module mesoslip_sliders_hazard_clock
 
    !> Duration of a window over the time in which a clock is expected to reach its reading
    real(wp), parameter :: window_ratio = 1.25_wp
+   !> Remaining reading over that of the window at its first rate, beyond which it is not expected
+   real(wp), parameter :: max_expected = 3.0_wp
 
    !> Maximum change of the exponent in a part of a step, in which the rule is exact to rounding
    real(wp), parameter :: max_change = 0.5_wp
@@ -62,14 +64,15 @@ contains
       real(wp), intent(in) :: time, velocity
       type(window_type), intent(inout) :: window
 
-      real(wp) :: expected
+      real(wp) :: expected, wanted
       integer :: number
 
       expected = huge(1.0_wp)
       do number = 1, clocks
          if (.not. (clock(number)%is_used .and. clock(number)%left < huge(1.0_wp))) cycle
-         expected = min(expected, expected_time(clock(number)%slope * velocity, &
-            & clock(number)%left / clock(number)%rate))
+         wanted = clock(number)%left / clock(number)%rate
+         if (wanted > max_expected * (window%end_time - time)) cycle
+         expected = min(expected, expected_time(clock(number)%slope * velocity, wanted))
       end do
       if (expected < huge(1.0_wp)) window%end_time = min(window%end_time, &
          & max(time + window_ratio * expected, nearest(time, 1.0_wp)))

@@ -21,6 +21,13 @@ module mesoslip_sliders_hazard_series
    !> function is below 1e-15 of it
    integer, parameter :: short_terms = 4, short_order = 6
    real(wp), parameter :: max_short(short_terms) = [2.0e-2_wp, 1.0e-5_wp, 1.0e-7_wp, 1.0e-9_wp]
+   !> Maximum terms of the exponent in a step in which values and derivatives at both ends are enough,
+   !> to 1e-12, and of the sum of those beyond; weights of the first to third derivatives
+   integer, parameter :: end_terms = 4
+   real(wp), parameter :: max_end(end_terms) = [0.12_wp, 4.0e-3_wp, 1.0e-4_wp, 1.0e-6_wp], &
+      & max_end_rest = 5.0e-11_wp
+   real(wp), parameter :: weight_1 = 3.0_wp / 28.0_wp, weight_2 = 1.0_wp / 84.0_wp, &
+      & weight_3 = 1.0_wp / 1680.0_wp
    !> A middling step has a longer series, whose last coefficients show whether it is exact
    integer, parameter :: low_order = 10, tail = 3
    real(wp), parameter :: max_low = 0.12_wp
@@ -58,50 +65,32 @@ contains
       !> Whether there is such a series; if not, nothing has changed
       logical, intent(out) :: is_done
 
-      real(wp) :: change, length, exponent(max_terms), short(short_terms)
+      real(wp) :: length, exponent(max_terms)
       integer :: term
-      logical :: is_short, may_end
+      logical :: may_end
 
       ended_by = 0
-      ! Most steps end before any reading.
-      may_end = any(clock%is_used .and. clock%left <= max_growth * (clock%rate * step))
       ! Both clocks have one slope but for its sign.
       length = clock(1)%slope
-      short = 0.0_wp
-      is_short = .true.
-      do term = 1, min(terms, short_terms)
-         length = length * step
-         short(term) = series(term - 1) * inverse(term) * length
-         is_short = is_short .and. abs(short(term)) <= max_short(term)
-      end do
-      if (is_short) then
-         change = 0.0_wp
-         do term = terms, short_terms + 1, -1
-            change = (change + abs(series(term - 1)) * inverse(term)) * step
-         end do
-         is_short = change * abs(length) <= no_change
-      end if
-      is_done = is_short
-      if (is_short .and. may_end) then
-         call advance_short(clock, short, step, ended_by)
-      else if (is_short) then
-         call pass_short(clock, short, step)
-      end if
-      if (is_short) return
-
-      length = clock(1)%slope
-      change = 0.0_wp
       do term = 1, terms
          length = length * step
          exponent(term) = series(term - 1) * inverse(term) * length
-         change = change + abs(exponent(term))
       end do
+      ! Most steps end before any reading.
+      may_end = any(clock%is_used .and. clock%left <= max_growth * (clock%rate * step))
       if (.not. may_end) then
-         call pass_smooth(clock, exponent, terms, step, is_done)
+         call pass_by_ends(clock, exponent, terms, step, is_done)
+         if (.not. is_done) call pass_smooth(clock, exponent, terms, step, is_done)
          if (is_done) return
       end if
       exponent(terms + 1:bent_order) = 0.0_wp
-      is_done = change <= max_low
+      is_done = all(abs(exponent(:short_terms)) <= max_short) &
+         & .and. sum(abs(exponent(short_terms + 1:terms))) <= no_change
+      if (is_done) then
+         call advance_short(clock, exponent(:short_terms), step, ended_by)
+         return
+      end if
+      is_done = sum(abs(exponent(:terms))) <= max_low
       if (is_done) call advance_middling(clock, exponent, step, ended_by, is_done)
       if (is_done) return
       is_done = abs(exponent(1)) <= max_linear
@@ -321,32 +310,52 @@ contains
       end do
    end subroutine pass
 
-   !> Advance by a short step which no clock ends. The mean is the sum of its coefficients
-   !> (short_means).
-   pure subroutine pass_short(clock, e, step)
+   !> Advance by a step which no clock ends, unless the exponent changes too much: from the
+   !> exponential function and its derivatives at both ends. The error of the mean is the eighth
+   !> derivative over 25401600.
+   pure subroutine pass_by_ends(clock, exponent, terms, step, is_done)
       type(hazard_clock_type), intent(inout) :: clock(clocks)
       !> The exponent of the first clock, over a step of length 1
-      real(wp), intent(in) :: e(short_terms)
+      real(wp), intent(in) :: exponent(max_terms)
+      integer, intent(in) :: terms
       real(wp), intent(in) :: step
+      !> Whether it is advanced; if not, nothing has changed
+      logical, intent(out) :: is_done
 
-      real(wp) :: even, odd, a_2, a_3, b_2
+      real(wp) :: total, slope, bend, twist, square, even, odd, even_late, odd_late, cosine, &
+         & sine
+      integer :: term
 
-      associate (a => e(1), b => e(2), c => e(3), d => e(4))
-         a_2 = 0.5_wp * a**2
-         a_3 = inverse(3) * a * a_2
-         b_2 = 0.5_wp * b**2
-         even = 1.0_wp + (inverse(3) * a_2 + (inverse(4) * a * b &
-            & + (inverse(5) * (inverse(6) * a_2**2 + (a * c + b_2)) &
-            & + (inverse(6) * (a_3 * b + (a * d + b * c)) &
-            & + inverse(7) * (0.05_wp * a_3**2 + (a_3 * c + a_2 * b_2) &
-            & + (b * d + 0.5_wp * c**2))))))
-         odd = inverse(2) * a + (inverse(3) * b + (inverse(4) * (a_3 + c) &
-            & + (inverse(5) * (a_2 * b + d) &
-            & + (inverse(6) * (0.1_wp * a_2 * a_3 + (a_2 * c + a * b_2)) &
-            & + inverse(7) * (inverse(6) * a_2**2 * b + (a_2 * d + a * b * c))))))
-      end associate
-      call pass(clock, step, even, odd)
-   end subroutine pass_short
+      is_done = terms >= end_terms
+      if (is_done) is_done = all(abs(exponent(:end_terms)) <= max_end) &
+         & .and. sum(abs(exponent(end_terms + 1:terms))) <= max_end_rest
+      if (.not. is_done) return
+      total = 0.0_wp
+      slope = 0.0_wp
+      bend = 0.0_wp
+      twist = 0.0_wp
+      do term = terms, 1, -1
+         total = total + exponent(term)
+         slope = slope + term * exponent(term)
+         bend = bend + (term * (term - 1)) * exponent(term)
+         twist = twist + (term * (term - 1) * (term - 2)) * exponent(term)
+      end do
+      ! Parts of the sums at each end that are even and odd in the exponent.
+      even_late = 0.5_wp + slope * (weight_2 * slope - (3.0_wp * weight_3) * bend)
+      odd_late = weight_2 * bend - slope * (weight_1 + weight_3 * slope**2) - weight_3 * twist
+      slope = exponent(1)
+      bend = 2.0_wp * exponent(2)
+      twist = 6.0_wp * exponent(3)
+      even = 0.5_wp + slope * (weight_2 * slope + (3.0_wp * weight_3) * bend)
+      odd = weight_2 * bend + slope * (weight_1 + weight_3 * slope**2) + weight_3 * twist
+      square = total**2
+      cosine = 1.0_wp + square * (0.5_wp + square * ((1.0_wp / 24.0_wp) + square &
+         & * ((1.0_wp / 720.0_wp) + square * (1.0_wp / 40320.0_wp))))
+      sine = total * (1.0_wp + square * ((1.0_wp / 6.0_wp) + square * ((1.0_wp / 120.0_wp) &
+         & + square * (1.0_wp / 5040.0_wp))))
+      call pass(clock, step, even + (cosine * even_late + sine * odd_late), &
+         & odd + (cosine * odd_late + sine * even_late))
+   end subroutine pass_by_ends
 
    !> Advance by a step which no clock ends, unless the exponent changes too much.
    pure subroutine pass_smooth(clock, exponent, terms, step, is_done)

@@ -125,16 +125,19 @@ contains
          step_time = motion%time
          start_displacement = motion%displacement
          law = schedule%law()
-         window = schedule%window(motion%time, motion%velocity)
+         window = schedule%window(motion%time)
          system%stiffness = system%spring + law%stiffness * system%inverse_mass
          system%drag = law%drag * system%inverse_mass
          step%drive_gap = drive_gap_at(self, motion)
          step%early = motion_rates(system, self%damping, motion, step%drive_gap, &
             & law%stiffness * motion%displacement - law%offset)
+         if (has_clocks) then
+            call schedule%hazard%offer(motion%displacement, self%clock)
+            call limit_window(self%clock, motion%time, motion%velocity, window)
+         end if
          call look_ahead(motion, window, step)
          call derive(system, self%damping, step)
          if (is_pending) call audit(self, books, motion)
-         if (has_clocks) call schedule%hazard%offer(motion%displacement, self%clock)
          call find_end(system, self%damping, step, is_short)
          if (is_short) then
             if (has_clocks) call end_by_clocks(self%clock, motion%time, step)
@@ -175,11 +178,12 @@ contains
    end subroutine run_through
 
    !> One step: a short one, as nearly all between two events, or another.
-   subroutine take_step(self, constant, window)
+   subroutine take_step(self, constant, whole_window)
       type(slider_rigid_type), intent(inout) :: self
       type(system_type), intent(in) :: constant
-      type(window_type), intent(in) :: window
+      type(window_type), intent(in) :: whole_window
 
+      type(window_type) :: window
       type(system_type) :: system
       type(motion_rates_type) :: early
       logical :: is_done
@@ -187,6 +191,8 @@ contains
       self%step_time = self%time
       self%start_displacement = self%displacement
 
+      window = whole_window
+      if (self%has_clocks) call limit_window(self%clock, self%time, self%velocity, window)
       system = constant
       system%stiffness = system%spring + self%law%stiffness * system%inverse_mass
       system%drag = self%law%drag * system%inverse_mass
@@ -215,25 +221,19 @@ contains
       end if
    end subroutine take_step
 
-   !> A step with clocks which is no short one in its whole window.
-   subroutine take_clocked_step(self, system, whole_window, early)
+   !> A step with clocks that is not a short one.
+   subroutine take_clocked_step(self, system, window, early)
       type(slider_rigid_type), intent(inout) :: self
       type(system_type), intent(in) :: system
-      type(window_type), intent(in) :: whole_window
+      type(window_type), intent(in) :: window
       !> The motion at the start of the step
       type(motion_rates_type), intent(in) :: early
 
-      type(window_type) :: window
       logical :: is_done
 
-      window = whole_window
-      call limit_window(self%clock, self%time, self%velocity, window)
       is_done = .false.
       if (.not. abs(self%drive%acceleration) > 0.0_wp) then
          call try_settled_step(self, system, window, early, is_done)
-         if (.not. is_done .and. window%end_time < whole_window%end_time) then
-            call try_short_step(self, system, window, early, is_done)
-         end if
       end if
       if (.not. is_done) call take_long_step(self, system, window, early)
    end subroutine take_clocked_step

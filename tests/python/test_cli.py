@@ -492,7 +492,8 @@ def test_messages_name_what_would_be_right(short, tmp_path, command):
     # Plain numbers are in SI, in options as in --set.
     assert "there is no sample from 70 s on" in command("plot", output, "--from", "70")[2]
     still = ("--set", "drive.velocity=1e-12", "-o", tmp_path / "still.nc")
-    assert "no contact broke" in command("run", short, *still)[2]
+    printed = command("run", short, *still)[2]
+    assert "no contact broke: the drive moves 2.2 pm, and F_s/K is 185.6 nm" in printed
     lost = tmp_path / "lost.toml"
     lost.write_text('base = "nothing.toml"\n')
     printed = command.refusal("info", lost)

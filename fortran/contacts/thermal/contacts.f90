@@ -18,7 +18,7 @@ module mesoslip_contacts_thermal_contacts
    use mesoslip_numerics_errors, only: error_type
    use mesoslip_numerics_kinds, only: i8, wp
    use mesoslip_numerics_parameters, only: parameters_type
-   use mesoslip_schedule, only: max_turns, schedule_type
+   use mesoslip_schedule, only: schedule_type
    implicit none
    private
 
@@ -53,6 +53,7 @@ contains
       allocate (self)
       self%parameters = common
       call set_up_steady(self, parameters, error)
+      if (.not. allocated(error)) call self%hazard%delay_turns()
       call move_alloc(self, contacts)
    end subroutine make_thermal_contacts
 
@@ -300,8 +301,7 @@ contains
       accepts_break = .true.
    end function accepts_break
 
-   !> Coordinate before which no contact breaks at its threshold, and no force changes its sign
-   !> unless its hazard is negligible there.
+   !> Coordinate before which no contact breaks at its threshold, or moves to the other clock.
    subroutine find_ahead(self, pose, law, ahead, end_time)
       class(thermal_contacts_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
@@ -311,30 +311,7 @@ contains
       !> Time before which it is used [s]
       real(wp), intent(inout) :: end_time
 
-      real(wp) :: last, key(max_turns)
-      integer :: contact, turns, turning(max_turns)
-
       call self%order(self%ahead)%first(ahead)
-      if (.not. self%hazard%lets_turn_later(pose%velocity)) return
-      ! The same rule as find_stop of a schedule, so that results agree to the bit.
-      last = ahead + self%hazard%turn_distance
-      turns = 0
-      do while (ahead <= last .and. turns < max_turns)
-         call self%order(self%ahead)%due(ahead, contact)
-         if (contact == 0) exit
-         if (.not. self%may_turn_later(contact)) exit
-         call self%order(self%ahead)%remove(contact)
-         turns = turns + 1
-         turning(turns) = contact
-         key(turns) = ahead
-         call self%order(self%ahead)%first(ahead)
-      end do
-      if (turns == 0) return
-      ahead = min(ahead, last)
-      end_time = min(end_time, pose%time + self%hazard%turn_duration)
-      do turns = turns, 1, -1
-         call self%order(self%ahead)%put(turning(turns), key(turns))
-      end do
    end subroutine find_ahead
 
    !> Whether the force of a contact changes its sign ahead.

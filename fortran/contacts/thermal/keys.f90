@@ -21,9 +21,6 @@ module mesoslip_contacts_thermal_keys
    public :: thermal_keys_type, set_up_keys, exchange_thermal, rebuild_thermal
    public :: life_clock, life_left, life_key, life_next, motions
 
-   !> Stretch over the mean breaking stretch at which the sign of a force changes: negligible, but
-   !> larger than rounding errors
-   real(wp), parameter :: tiny_stretch = 1.0e-12_wp
    !> Maximum change of the exponents up to which keys are rescaled rather than solved again
    real(wp), parameter :: max_rescaling = 310.0_wp
    !> Numbers of the life of a contact: its clock, 0 while it is detached; the remaining deviate
@@ -182,7 +179,8 @@ contains
       real(wp), intent(in) :: limit, direction
       real(wp) :: distance
 
-      distance = merge(limit, tiny_stretch * self%stretch, force_sign(number) * direction > 0.0_wp)
+      distance = merge(limit, self%hazard%turn_stretch(limit), &
+         & force_sign(number) * direction > 0.0_wp)
    end function distance
 
    !> Bound on the stretch at which a contact breaks [m]: its limit, but for kinds whose limits are

@@ -8,22 +8,24 @@ module mesoslip_contacts_thermal_lists
    use mesoslip_interface_law, only: clocks, pose_type
    use mesoslip_numerics_kinds, only: i8, wp
    use mesoslip_numerics_random, only: uniform_pairs
-   use mesoslip_schedule, only: max_events, max_turns, schedule_type
+   use mesoslip_schedule, only: max_events, schedule_type
    implicit none
    private
 
    public :: thermal_lists_type
 
-   !> Minimum length of a schedule: with the contacts whose forces change their sign in a step
-   integer, parameter :: min_length = max_turns + 4
+   !> Minimum length of a list of a schedule
+   integer, parameter :: min_length = 8
+   !> The lists: events by coordinate, breaks by the clock, attachments
+   integer, parameter :: lists = 3, by_coordinate = 1, by_clock = 2, attachments = 3
 
    !> Contacts that break by thermal activation, and write schedules with clocks.
    type, abstract, extends(thermal_keys_type) :: thermal_lists_type
       !> Contacts of the schedule, by coordinate and by clock, and those that attach in it
       integer, private :: listed(max_events) = 0, clock_listed(max_events) = 0, &
          & attaching(max_events) = 0
-      !> Length of the next schedule, by how much of the last one happened
-      integer, private :: max_length = max_events
+      !> Lengths of the next lists, by how much of the last ones happened
+      integer, private :: max_length(lists) = max_events
       !> Entry of each contact in the list by coordinate; 0 except while lists are written
       integer, allocatable :: entry(:)
    contains
@@ -83,7 +85,7 @@ contains
       integer, intent(in) :: limit
       type(schedule_type), intent(inout) :: schedule
 
-      integer :: length
+      integer :: length(lists)
 
       schedule%is_over = .true.
       if (self%track%columns > 0 .or. pose%direction * self%direction < 0.0_wp) return
@@ -91,7 +93,7 @@ contains
       schedule%number = merge(1, 2, self%direction > 0.0_wp)
       if (self%members(schedule%number) == 0) return
       length = min(limit, self%max_length)
-      call self%list_breaks(length, schedule)
+      call self%list_breaks(length(by_coordinate), length(by_clock), schedule)
       if (schedule%breaks == 0 .or. schedule%clock_breaks == 0) return
       schedule%has_clocks = .true.
       call self%set_next()
@@ -99,11 +101,10 @@ contains
       schedule%hazard%next(schedule%number) = schedule%clock_key(1)
       schedule%direction = self%direction
       schedule%behind = self%behind
-      schedule%tiny_stretch = self%distance(schedule%number, 0.0_wp, -self%direction)
       schedule%break_stiffness(1) = self%parameters%stiffness
       schedule%break_drag(1) = drag_of(self%parameters, self%parameters%stiffness)
-      call self%list_attaching(length, pose%direction, schedule)
-      schedule%is_over = .not. schedule%knows_stop()
+      call self%list_attaching(length(attachments), pose%direction, schedule)
+      schedule%is_over = .false.
    end subroutine plan_by_clocks
 
    !> List the next attachments in a direction of motion, and the births of contacts that break and
@@ -147,16 +148,17 @@ contains
 
    !> List the next breaks at thresholds, with the contacts of the other clock whose forces change
    !> their sign, and breaks by the clock. That list ends before a key that is not known.
-   subroutine list_breaks(self, limit, schedule)
+   subroutine list_breaks(self, limit, clock_limit, schedule)
       class(thermal_lists_type), intent(inout) :: self
-      integer, intent(in) :: limit
+      !> Maximum lengths of the lists by coordinate and by the clock
+      integer, intent(in) :: limit, clock_limit
       type(schedule_type), intent(inout) :: schedule
 
       integer :: event, other, first
 
       call self%order(self%ahead)%preview(limit, self%listed, &
          & schedule%break_coordinate, schedule%breaks)
-      call self%order(motions + schedule%number)%preview(limit, self%clock_listed, &
+      call self%order(motions + schedule%number)%preview(clock_limit, self%clock_listed, &
          & schedule%clock_key, schedule%clock_breaks)
       schedule%clock_stop = 0
       schedule%turned = 0
@@ -173,8 +175,6 @@ contains
          associate (contact => self%listed(event))
             schedule%break_origin(event) = self%record(row_origin, contact)
             schedule%break_turns(event) = int(self%life(life_clock, contact)) /= schedule%number
-            schedule%turns_later(event) = schedule%break_turns(event) &
-               & .and. self%record(row_limit, contact) >= self%hazard%turn_limit
             if (schedule%break_turns(event)) then
                schedule%turn_limit(event) = self%record(row_limit, contact)
                schedule%turn_left(event) = self%life(life_left, contact)
@@ -215,7 +215,7 @@ contains
       type(schedule_type), intent(in) :: schedule
 
       self%max_length = min(max_events, max(min_length, &
-         & 2 * max(schedule%came_count + schedule%turned, schedule%attached)))
+         & 2 * [schedule%broken, schedule%clock_broken, schedule%attached]))
       self%hazard = schedule%hazard
       call self%detach_came(schedule)
       call self%turn_came(schedule)

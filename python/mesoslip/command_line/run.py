@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from itertools import pairwise
 from pathlib import Path
@@ -187,7 +188,7 @@ def _report_results(results: Results, config: Config, path: Path, stop: Stop) ->
     else:
         say(f"{path}: {_regimes(results, path, stop)}")
     if known["break_count"] == 0:
-        say(f"{path}: no contact broke: the drive did not move far enough")
+        say(f"{path}: no contact broke: {_short_drive(config)}")
     if known["audit"] != "passed":
         say(f"{path}: warning: {known['audit']}")
     if config.contacts.weak_track is not None:
@@ -203,6 +204,17 @@ def _report_results(results: Results, config: Config, path: Path, stop: Stop) ->
         say(f"{path}: {config.continued_drive}")
     if known["ending"] != ENDINGS["drive"]:
         say(f"{path}: end of the run: {known['ending']}")
+
+
+def _short_drive(config: Config) -> str:
+    """Why no contact broke: how far the drive moved, and how far it loads the spring to F_s."""
+    from mesoslip.quantities import with_unit
+
+    if not 0 < config.spring_stiffness < math.inf:
+        return "the drive did not move far enough"
+    path_length = math.fsum(part.path_length for part in config.drive_parts)
+    needed = config.contacts.static_force / config.spring_stiffness
+    return f"the drive moves {with_unit(path_length, 'm')}, and F_s/K is {with_unit(needed, 'm')}"
 
 
 def _regimes(results: Results, path: Path, stop: Stop) -> str:

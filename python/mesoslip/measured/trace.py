@@ -16,6 +16,7 @@ from mesoslip.analysis.apparatus import first_velocity
 from mesoslip.analysis.noise import TraceNoise, estimate_noise
 from mesoslip.analysis.sampled_slips import FoundSlips
 from mesoslip.analysis.strokes import (
+    FORCE,
     angle_of,
     are_of_track,
     back_and_forth,
@@ -316,6 +317,7 @@ def trace_of(understood: Understood) -> DataTree:
         record.time,
         record.force,
         noise=noise,
+        are_guessed=cut_by == FORCE,
         period=period,
         direction=direction,
         min_fall=trace.si("min_fall"),

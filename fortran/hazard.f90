@@ -68,7 +68,7 @@ module mesoslip_hazard
       !> For forces that change their sign: stretch at which a contact moves to the other clock,
       !> which may be larger where its rate is negligible
       procedure, non_overridable :: turn_stretch, delay_turns
-      !> Where and how long their hazard is negligible, and whether a motion is fast enough that they
+      !> Where and how long their hazard is negligible, and whether a motion is so fast that they
       !> need no step of their own
       procedure, non_overridable :: limit_turns, lets_turn_later
    end type hazard_type

@@ -126,9 +126,8 @@ module mesoslip_schedule
       !> Let sites touch or separate. By dispatch, because a copy of it in pass would keep that from
       !> being inlined into the loops of sliders.
       procedure, private :: follow_load
-      procedure, non_overridable, private :: pass_clocks, break_by_clock, &
-         & pass_coordinate, break_with_clocks, attach_with_clocks, &
-         & change_sign, cut_lists, skip_gone
+      procedure, non_overridable, private :: pass_clocks, break_by_clock, pass_coordinate, &
+         & break_with_clocks, attach_with_clocks, change_sign, cut_lists, skip_gone
    end type schedule_type
 
 contains
@@ -429,8 +428,8 @@ contains
       call self%skip_gone()
    end subroutine break_by_clock
 
-   !> Break the contacts that have reached their thresholds, and move those to the other clock whose
-   !> forces have changed their sign.
+   !> Break the contacts that have reached their thresholds, and move those to the other clock that
+   !> have reached where they turn.
    subroutine pass_coordinate(self, time, displacement)
       class(schedule_type), intent(inout) :: self
       real(wp), intent(in) :: time, displacement

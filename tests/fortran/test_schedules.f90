@@ -1,11 +1,15 @@
 !> Schedules: a run is the same to the bit whatever their length, and wherever it is cut.
 program test_schedules
    use klein_case, only: any_work, count, forever, prepare, same
+   use mesoslip_contacts_base, only: contact_parameters_type
+   use mesoslip_contacts_individual_sites, only: contact_sites_type, new_contact_sites
    use mesoslip_contacts_mechanics, only: initial_steady
    use mesoslip_loop_endings, only: ending_drive
    use mesoslip_loop_simulation, only: simulation_type
    use mesoslip_numerics_errors, only: error_type
+   use mesoslip_normal_load, only: take_normal_load
    use mesoslip_numerics_kinds, only: i8, wp
+   use mesoslip_numerics_parameters, only: name_length, new_parameters, parameters_type
    use mesoslip_schedule, only: max_events
    use testing, only: check, finish
    implicit none
@@ -32,11 +36,51 @@ program test_schedules
    call runs_ahead("thermal", "prescribed", "exponential", 1.0_wp, 1.0e-5_wp)
    call runs_ahead("thermal scattered", "rigid", "gaussian", 0.1_wp, 5.0e-4_wp)
    call runs_ahead("thermal scattered", "prescribed", "exponential", 1.0_wp, 1.0e-5_wp)
+   call preview_changes_nothing()
    call has_length_by_load("loaded", .false.)
    call has_length_by_load("loaded scattered", .true.)
    call finish()
 
 contains
+
+   !> Sites touch and separate as if nobody had looked ahead, by however many events: here also by
+   !> as many that touch in a jump as separate after it.
+   subroutine preview_changes_nothing()
+      integer, parameter :: limit = 60, parts = 3
+      character(len=name_length), parameter :: names(3) = [character(len=name_length) :: &
+         & "load_part_end", "load_start_share", "load_end_share"]
+      type(contact_parameters_type) :: contacts
+      type(parameters_type) :: load
+      type(contact_sites_type) :: sites, looked
+      type(error_type), allocatable :: error
+      integer :: ahead, number, site, expected, seen(limit + 1), events
+      real(wp) :: time(limit + 1)
+      logical :: touches, seen_touches(limit + 1), is_same
+
+      call new_parameters(load, [spread(names(1), 1, parts), spread(names(2), 1, parts), &
+         & spread(names(3), 1, parts)], [1.0_wp, 2.0_wp, 3.0_wp, 0.5_wp, 0.6_wp, 0.2_wp, 0.5_wp, &
+         & 0.4_wp, 0.9_wp])
+      call take_normal_load(contacts%load, load, error)
+      contacts%count = 200
+      call new_contact_sites(sites, contacts, error)
+      call check(.not. allocated(error), "sites under a load in parts")
+      events = 0
+      is_same = .true.
+      do while (sites%next_time < huge(1.0_wp))
+         looked = sites
+         do ahead = 1, limit
+            call looked%preview(contacts, ahead, seen, seen_touches, time, number)
+            is_same = is_same .and. looked%next_time >= sites%next_time &
+               & .and. looked%next_time <= sites%next_time .and. looked%count == sites%count
+         end do
+         call sites%take_next(contacts, expected, touches)
+         call looked%take_next(contacts, site, touches)
+         is_same = is_same .and. site == expected
+         events = events + 1
+      end do
+      call check(events > 150, "sites touch and separate")
+      call check(is_same, "a preview of sites changes nothing")
+   end subroutine preview_changes_nothing
 
    !> Schedules are as long as events of the load let them be, where these are not in them.
    subroutine has_length_by_load(contacts, is_short)

@@ -32,6 +32,8 @@ TABLE = 0.2
 STIFFNESSES = 0.5
 # Largest force on a slider without a spring, over the static force.
 MOST_FORCE = 1.3
+# Parts of those with a normal load, on a track, and with contacts that keep their thresholds.
+LOAD, TRACK, KEEP = 0.4, 0.3, 0.15
 
 MAX_WIDTH = {
     "gaussian": 1.0,
@@ -99,7 +101,58 @@ def draw(random: Random) -> Tables:
             contacts["ageing"] = _ageing(random, contacts, duration)
     if contacts["initial"] != "steady" and "ageing" not in contacts and random.random() < NEWBORN:
         contacts["newborn_width"] = _newborn_width(random, contacts, engine)
+    if random.random() < LOAD:
+        tables["load"] = _load(random, duration, contacts["count"], is_constant=bool(interaction))
+    is_alike = "thermal" not in contacts and "stiffnesses" not in contacts["threshold"]
+    if random.random() < TRACK and (engine == "eq" or is_alike):
+        contacts["track"] = _track(random, stretch)
+    if random.random() < KEEP and engine == "eq":
+        contacts["renewal"] = "keep"
     return tables
+
+
+def _load(random: Random, duration: float, count: int, *, is_constant: bool) -> Tables:
+    """A normal load, constant or in stages, cycles or a history; of 0 in some of them."""
+    force = decades(random, -6, 3)
+
+    def normal_force() -> float:
+        return force * random.choice([1.0, 1.0, 0.0, random.uniform(0, 2)])
+
+    what = "constant" if is_constant else _one_of(random, constant=1, stage=3, cycle=2, history=1)
+    load: Tables = {"normal_force": force}
+    if what == "stage":
+        # Some loads end before the run, which is said, and holds.
+        lengths = [duration * random.uniform(0.05, 0.6) for _ in range(random.randint(1, 5))]
+        load["stage"] = [
+            {"duration": one, "normal_force": normal_force()}
+            if random.random() < 0.5
+            else {
+                "duration": one,
+                "start_normal_force": normal_force(),
+                "end_normal_force": normal_force(),
+            }
+            for one in lengths
+        ]
+        load["stage"][0] = {"duration": lengths[0], "normal_force": force}
+    elif what == "cycle":
+        amplitude = random.choice([1.0, random.uniform(0.01, 1)])
+        cycles = min(random.uniform(0.2, 100), MOST_BREAKS / (count * amplitude))
+        load["cycle"] = {"amplitude": amplitude * force, "frequency": cycles / duration}
+        if random.random() < 0.5:
+            load["cycle"]["phase"] = random.uniform(-3, 3)
+    elif what == "history":
+        times = [0.0, *sorted(duration * random.uniform(0.01, 1.2) for _ in range(4))]
+        load["history"] = {"time": times, "normal_force": [normal_force() for _ in times]}
+    return load
+
+
+def _track(random: Random, stretch: float) -> Tables:
+    """A strength along the track, over lengths from a fifth of the breaking stretch on."""
+    return {
+        "spread": random.choice([0.3, decades(random, -3, 0)]),
+        "length": stretch * decades(random, -0.7, 2),
+        "correlation": random.choice(["gaussian", "exponential"]),
+    }
 
 
 def _sliding_time(slider: Tables, force: float, path: float) -> float:

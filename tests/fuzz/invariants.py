@@ -80,6 +80,11 @@ def broken(tree: xr.DataTree, config: Config) -> Iterator[str]:
         yield from _wrong_avalanches(tree, config)
 
 
+def site_count(config: Config) -> int:
+    """Contacts at the maximum of the normal load."""
+    return config.pressing.site_count(config.contacts.count)
+
+
 def _not_finite(tree: xr.DataTree) -> Iterator[str]:
     lengths = _lengths(tree)
     for node in tree.subtree:
@@ -97,6 +102,9 @@ def _not_finite(tree: xr.DataTree) -> Iterator[str]:
                     wrong[number, length:] = False
             elif node.name == "snapshots" and name in {"stretch", "load"}:
                 wrong &= data["pinned"].values == 1
+            if name == "friction_coefficient":
+                # There is none without a load.
+                wrong &= data["normal_force"].values != 0
             if wrong.any():
                 yield f"finite: {node.path.rstrip('/')}/{name}, {wrong.sum()} values"
     for name, value in tree.attrs.items():
@@ -122,7 +130,7 @@ def _wrong_trace(tree: xr.DataTree, config: Config) -> Iterator[str]:
         yield f"trace: goes on to {time[-1]:g} s, beyond {duration:g} s"
     if tree.attrs["ending"] == ENDINGS["drive"] and time[-1] < duration - interval * (1 + 1e-6):
         yield f"trace: ends at {time[-1]:g} s, before {duration:g} s"
-    detached, count = tree["detached_contacts"].values, config.contacts.count
+    detached, count = tree["detached_contacts"].values, site_count(config)
     slack = 0 if config.contact_kind.is_discrete else ROUNDING * count
     if np.nanmin(detached) < -slack or np.nanmax(detached) > count + slack:
         yield f"contacts: {np.nanmin(detached):g} to {np.nanmax(detached):g} of {count} detached"
@@ -206,7 +214,7 @@ def _wrong_avalanches(tree: xr.DataTree, config: Config) -> Iterator[str]:
     catalogue = tree["avalanches"].to_dataset(inherit=False)
     yield from _wrong_owners(catalogue, tree, "avalanches")
     least = config.output.avalanche_size or 1
-    count = config.contacts.count
+    count = site_count(config)
     for number, mine in _owned(catalogue, tree):
         time, size = mine["start_time"].values, mine["size"].values
         if np.any(np.diff(time) < 0):

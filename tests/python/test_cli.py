@@ -20,10 +20,11 @@ import tomli_w
 import xarray as xr
 from conftest import ROOT, klein_tables, long
 from mesoslip.analysis.regime import outputs
-from mesoslip.command_line.main import COMMANDS, GROUPS
+from mesoslip.command_line.main import COMMANDS, GROUPS, app
 from mesoslip.command_line.progress import say
 from mesoslip.errors import RunError
 from mesoslip.output.writing import write
+from typer.main import get_command
 
 pytestmark = pytest.mark.usefixtures("quick_pictures")
 
@@ -242,6 +243,35 @@ def test_an_interrupt_after_the_output_is_written_is_answered_at_once(
     assert command("regime", output)[1].count("realization ") == 20
 
 
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("strokes", "--json", "--latex"), "--latex: does not go with --json: give one format"),
+        (("plateaus", "--latex", "--json"), "--json: does not go with --latex"),
+        (("response", "--markdown", "--latex"), "--latex: does not go with --markdown"),
+        (("response", "--posterior", "--json", "--markdown"), "--markdown: does not go with"),
+    ],
+)
+def test_one_format_is_printed_at_a_time(arguments, message, command):
+    """Before the output is read; twice the same is one."""
+    status, printed, err = command(*arguments, "nowhere.nc")
+    assert (status, printed) == (2, "")
+    assert message in err
+    assert "nowhere.nc: " in command(arguments[0], "--json", "--json", "nowhere.nc")[2]
+
+
+def test_all_formats_are_refused_beside_others():
+    """Flags of formats are those of `format_option`."""
+    flags = [
+        parameter
+        for command in get_command(app).commands.values()
+        for parameter in command.params
+        if {"--json", "--latex", "--markdown"} & set(parameter.opts)
+    ]
+    assert len(flags) > 15
+    assert all(one.callback is not None for one in flags)
+
+
 def test_all_that_takes_a_while_reports_its_progress(tmp_path, command, monkeypatch):
     """Where there is no terminal too: writing after the run, measured traces, movies; and a large
     output before the run."""
@@ -362,6 +392,9 @@ json.dump(found, stdout)
         (["slips", "truncated.nc"], ["truncated.nc"]),
         (["run", "truncated.nc"], ["truncated.nc"]),
         (["slips", "good.nc", "--csv", "."], ["written"]),
+        (["response", "good.nc", "./good.nc"], ["good.nc: is given twice"]),
+        (["trace", "a.csv", "b.csv", "a.csv", "-o", "x.nc"], ["a.csv: is given twice"]),
+        (["fit", "good.nc", "good.nc", "short.toml", "-o", "x.nc"], ["good.nc: is given twice"]),
     ],
 )
 def test_mistakes(arguments, words, damaged, command, monkeypatch):
@@ -459,7 +492,8 @@ def test_messages_name_what_would_be_right(short, tmp_path, command):
     # Plain numbers are in SI, in options as in --set.
     assert "there is no sample from 70 s on" in command("plot", output, "--from", "70")[2]
     still = ("--set", "drive.velocity=1e-12", "-o", tmp_path / "still.nc")
-    assert "no contact broke" in command("run", short, *still)[2]
+    printed = command("run", short, *still)[2]
+    assert "no contact broke: the drive moves 2.2 pm, and F_s/K is 185.6 nm" in printed
     lost = tmp_path / "lost.toml"
     lost.write_text('base = "nothing.toml"\n')
     printed = command.refusal("info", lost)

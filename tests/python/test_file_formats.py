@@ -11,6 +11,7 @@ import pandas
 import pytest
 from mesoslip import ConfigError, FileError
 from mesoslip.measured.reading import blocks
+from mesoslip.measured.reading.file import read_file
 from mesoslip.measured.reading.stamps import Chosen, chosen_order
 from mesoslip.measured.trace import understand
 
@@ -175,6 +176,55 @@ def test_blocks_of_a_file_have_one_order_of_dates(tmp_path, monkeypatch):
     record = understand(path, rate=0.2).record
     np.testing.assert_array_equal(record.time, times)
     assert "\n".join(record.report).count("dates as month/day/year (--dates)") == 1
+
+
+def test_blocks_of_a_clock_without_dates_pass_midnight(tmp_path, monkeypatch):
+    """Each block has a few minutes of three days."""
+    monkeypatch.setattr(blocks, "BLOCK", 400)
+    path, step = tmp_path / "a.csv", datetime.timedelta(seconds=500.5)
+    start = datetime.datetime(2026, 3, 4, 10, 5)
+    stamps = [(start + n * step).strftime("%H:%M:%S.%f") for n in range(500)]
+    rows = [f"{one},{n % 4}.5" for n, one in enumerate(stamps)]
+    path.write_text("Clock,Force [N]\n" + "\n".join(rows) + "\n")
+    for options in ({}, {"rate": 1 / 500.5}):
+        record = understand(path, **options).record
+        np.testing.assert_array_equal(record.time, 500.5 * np.arange(500))
+
+
+ROWS = (
+    # Days and hours with one digit and two, months, halves of the day, quotes and blanks.
+    ("9 Mar 2026 9:59:59.5 PM", 0.0),
+    ("9 Mar 2026 10:00:00 PM", 0.5),
+    ('"9 Mar 2026 11:59:59.25 PM"', 7199.75),
+    (" 10 Mar 2026 12:00:00.125 AM ", 7200.625),
+    ("31 Mar 2026 12:00:00 pm", 1864800.5),
+    ("1 Apr 2026 1:00:00.000000001 a.m.", 1911600.500000001),
+)
+
+
+def test_time_stamps_of_many_forms_in_a_column(tmp_path):
+    """Also where another column has words; lines without a number are left out."""
+    path = tmp_path / "a.csv"
+    rows = [f"{one};{n},5;{'ok' if n % 2 else ''}" for n, (one, _) in enumerate(ROWS * 4)]
+    rows.insert(9, "10 Mar 2026 2:00:00 AM;;")
+    rows.insert(5, ";7,5;")
+    path.write_text("Time;Force [N];State\n" + "\n".join(rows) + "\n")
+    table = read_file(path)
+    np.testing.assert_array_equal(np.delete(table.values[0], 5), [one for _, one in ROWS * 4])
+    assert np.isnan(table.values[0, 5])
+    np.testing.assert_array_equal(np.delete(table.values[1], 5), np.arange(24) + 0.5)
+    assert table.bad == {2: table.bad[2]}
+
+
+@pytest.mark.parametrize("wrong", ["24:00:00", "12:60:00", "12:00", "1.5", "12:00:00 XM"])
+def test_a_cell_that_is_no_time_stamp_is_named(wrong, tmp_path):
+    path = tmp_path / "a.csv"
+    rows = [f"12:00:{n:02d},{n}" for n in range(30)]
+    rows[20] = f"{wrong},20"
+    path.write_text("Time,Force [N]\n" + "\n".join(rows) + "\n")
+    table = read_file(path)
+    assert [(one.line, one.text) for one in table.bad[0]] == [(22, wrong)]
+    np.testing.assert_array_equal(np.delete(table.values[0], 20), np.delete(np.arange(30), 20))
 
 
 def test_a_time_stamp_among_numbers_is_none(tmp_path):

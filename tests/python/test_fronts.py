@@ -22,9 +22,11 @@ from mesoslip.analysis.fronts import (
 )
 from mesoslip.campaign.measures import MEASURES, RunView
 from mesoslip.command_line.main import app
+from mesoslip.plots.axis import time_since
 from mesoslip.plots.draw import movie_of
+from mesoslip.plots.style import canvas
 from mesoslip.plots.views.base import Options
-from mesoslip.plots.views.fronts import picture_of
+from mesoslip.plots.views.fronts import draw_fronts, picture_of
 from mesoslip.simulation.fronts import (
     ARRESTS,
     CLOSED_AFTER,
@@ -277,6 +279,24 @@ def test_views_of_an_interface_are_drawn(tree, view):
     for line, values in drawn:
         inside = np.mean((np.asarray(values) >= low) & (np.asarray(values) <= high))
         assert inside > 0.5, line.get_label()
+
+
+@pytest.mark.parametrize(("limit", "is_labelled"), [(0, True), (-1, False)])
+def test_fronts_without_a_speed_do_not_count_towards_the_limit_of_labels(
+    tree, monkeypatch, limit, is_labelled
+):
+    picture = picture_of(tree, Options())
+    fronts = picture.found.fronts
+    fronts["speed_ratio"][0] = np.nan
+    low, high = picture.window
+    known = np.isfinite(fronts["speed_ratio"])
+    known &= (fronts["end_time"] >= low) & (fronts["start_time"] <= high)
+    assert 0 < known.sum() < known.size
+    monkeypatch.setattr("mesoslip.plots.views.fronts.MAX_SPEEDS", known.sum() + limit)
+    figure = canvas(None, (6.5, 5.6))
+    draw_fronts(figure.subplots(), tree, picture, time_since(picture.window))
+    labels = [one.get_text() for one in figure.axes[0].texts if one.get_text().endswith(" c")]
+    assert len(labels) == (known.sum() if is_labelled else 0)
 
 
 def test_the_window_of_an_event_starts_with_its_first_slip(tree):

@@ -55,6 +55,19 @@ def test_dates_of_parts_have_the_time_between_them(folder):
         assert ("guess: the clock of d.txt" in "\n".join(record.report)) != is_known
 
 
+def test_clocks_without_dates_of_parts_have_the_time_between_them(folder):
+    """Parts of an evening, over midnight, and of the day after."""
+    for name, start in (("c", "22:58"), ("d", "23:59"), ("e", "00:30"), ("f", "00:20")):
+        rows = [f"{start}:{n:02d}\t{2 + n % 3}" for n in range(40)]
+        (folder / f"{name}.txt").write_text("\n".join(["time\tforce [N]", *rows, ""]))
+    record = understand([folder / f"{name}.txt" for name in "cdef"]).record
+    starts = 60 * np.array([0, 61, 92, 1440 + 82])
+    np.testing.assert_array_equal(record.time.reshape(4, 40), starts[:, None] + np.arange(40))
+    lines = [one for one in record.report if "no dates" in one]
+    assert lines[0].startswith("guess: d.txt was recorded within a day after c.txt")
+    assert len(lines) == 3
+
+
 def test_a_description_names_parts_and_the_output_repeats_them(folder):
     description = folder / "test.toml"
     description.write_text('[trace]\nfile = ["a.txt", "b.txt"]\n')

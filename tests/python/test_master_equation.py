@@ -642,3 +642,23 @@ def test_steps_longer_than_the_delay_expect_all_that_attaches(klein):
         for resolution in (0.25, 0.0625)
     ]
     assert starts[0] == pytest.approx(starts[1], abs=1e-5)
+
+
+def test_contacts_that_join_others_break_at_all_their_thresholds(klein):
+    """While a soft slider creeps: with joint populations that had broken up to the thresholds of
+    their first contacts, the displacement was of first order (ratio 2.1)."""
+    displacements = [
+        slips_of_strong_back_force(
+            klein,
+            resolution,
+            run__duration=0.168,
+            drive__velocity=1.94e-6,
+            slider__stiffness=43.0,
+            slider__damping_ratio=0.5,
+            contacts__delay=0.0,
+            **dispersion(0.13),
+        ).trace[-200:, 2]
+        for resolution in (0.25, 0.125, 0.0625)
+    ]
+    changes = [np.sqrt(np.mean(one**2)) for one in np.diff(displacements, axis=0)]
+    assert changes[0] > 3 * changes[1]

@@ -12,6 +12,7 @@ from conftest import at_end
 from kinds import LOAD, VIBRATING, configuration
 from mesoslip import Config, ConfigError, Realization
 from mesoslip.analysis.response import write_csv
+from mesoslip.analysis.slips import catalogue_of
 from mesoslip.configuration.load import Load
 from scipy.interpolate import CubicSpline
 
@@ -232,7 +233,7 @@ def test_energy_is_conserved_in_any_motion_under_a_load(seed):
         assert abs(one.energy_residual) < 1e-12
 
 
-def test_outputs_have_the_load_and_the_coefficient():
+def test_outputs_have_the_load_and_the_coefficient(tmp_path):
     tree = mesoslip.run(configuration("rigid", **LOAD))
     force, normal = tree["spring_force"].values[0], tree["normal_force"].values[0]
     assert normal == pytest.approx(
@@ -247,8 +248,39 @@ def test_outputs_have_the_load_and_the_coefficient():
     assert slips["friction_coefficient"].values == pytest.approx(
         slips["force_before"].values / slips["normal_force"].values
     )
+    catalogue = catalogue_of(tree)
+    catalogue.write_csv(tmp_path / "slips.csv")
+    head, first, *_ = (tmp_path / "slips.csv").read_text().splitlines()
+    assert head.endswith(",normal_force [N],friction_coefficient [1]")
+    assert float(first.rpartition(",")[2]) == slips["friction_coefficient"].values[0]
+    assert {"normal force (N)", "coefficient"} <= set(catalogue.printed().head)
+    assert "normal_force" in catalogue.statistics
     assert tree["energy"]["separation_loss"].item() > 0
     assert {"normal_force", "friction_coefficient"} <= set(tree["slip_traces"].data_vars)
+
+
+def test_contacts_that_touch_or_separate_are_counted_before_a_run(tmp_path, command, monkeypatch):
+    """As often as the load passes the force of each; a run whose load changes for hours says so,
+    and populations do not follow contacts."""
+    for changes in (LOAD, VIBRATING):
+        config = configuration("rigid", **changes)
+        times = np.linspace(0, config.duration, 200_001)
+        path = np.abs(np.diff(config.pressing.force_at(times))).sum()
+        expected = config.contacts.count * path / config.pressing.normal_force
+        assert config.contact_kind.load_changes(config) == pytest.approx(expected, rel=0.02)
+    assert config.replace({"run.engine": "me"}).contact_kind.load_changes(config) == 0
+    path = tmp_path / "case.toml"
+    path.write_text(config.to_toml())
+    changes = config.contact_kind.load_changes(config)
+    printed = command("info", path)[1]
+    found = next(line for line in printed.splitlines() if line.startswith("load_changes"))
+    assert float(found.split()[1]) == pytest.approx(changes, rel=0.01)
+    # Two realizations take as long as is reported.
+    monkeypatch.setattr("mesoslip.command_line.run.LONG", 1.5e-7 * changes)
+    for count in (1, 2):
+        more = ("-o", tmp_path / "run.nc", "--set", f"run.realizations={count}")
+        said = f"contacts will touch or separate about {count * changes:.1g} times"
+        assert (said in command("run", path, *more)[2]) == (count == 2)
 
 
 def test_loads_at_times():
@@ -356,7 +388,9 @@ def steps_up_and_down():
 
 def test_the_response_to_a_step_is_direct_or_transient(steps_up_and_down, relaxed):
     """Up: all of it after sliding, with alpha = mu (1 - L/L')/ln(L'/L). Down: all of it at once."""
-    found = mesoslip.response(steps_up_and_down, fit=False)["load_steps"].to_dataset()
+    response = mesoslip.response(steps_up_and_down, fit=False)
+    assert "several normal forces" in response["steady"]["note"].item()
+    found = response["load_steps"].to_dataset()
     assert found["load_step_time"].values == pytest.approx([2e4, 4e4], abs=20)
     assert found["normal_force_after"].values == pytest.approx([1.5, 1.0])
     # Just after is the first sample, up to 10 s or a hundredth of a breaking stretch after.
@@ -410,7 +444,7 @@ def test_a_vibrating_load_has_no_steps():
 
 def test_reports_and_pictures_have_the_load():
     from mesoslip.plots.views.run import caption
-    from mesoslip.reports.method_paragraphs import feature_sentence
+    from mesoslip.reports.model_sentences import feature_sentence
 
     config = configuration("rigid", **VIBRATING)
     sentence = feature_sentence(config.contact_features["load"], "load", config)

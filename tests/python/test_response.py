@@ -15,7 +15,7 @@ from conftest import ROOT, klein_tables
 from matplotlib.figure import Figure
 from mesoslip import Config, FileError
 from mesoslip.analysis.rate_and_state import Loading, fit_laws
-from mesoslip.analysis.response import line, rows_of, scalars_of, tables
+from mesoslip.analysis.response import force_scale, line, rows_of, scalars_of, tables
 from mesoslip.analysis.steady_force import steady_mean, transient
 from mesoslip.theory.steady_sliding import sliding_of
 from oracles import Friction, spring_slider
@@ -336,6 +336,23 @@ def test_tables_have_one_unit_a_column_and_the_digits_of_errors(sliding, sliding
     steady = tables(mesoslip.response([sliding, other], fit=False))[0]
     assert steady.head[3] == "steady force (µN)"
     assert steady.line.endswith("µN") or "µN (" in steady.line or "nN (" in steady.line
+
+
+def test_forces_of_a_trace_are_not_divided_by_the_static_force_of_a_run(sliding, tmp_path):
+    """Which is unknown for the trace; neither is the same output taken for two."""
+    path = tmp_path / "trace.csv"
+    time = np.arange(0, 20, 0.01)
+    force = 5 + 0.01 * np.random.default_rng(1).standard_normal(time.size)
+    np.savetxt(path, np.stack([time, force], 1), delimiter=",", header="time [s],force [N]")
+    trace = mesoslip.read_trace(path, columns="time [s], force [N]", velocity=1e-6)
+    for place, outputs in enumerate(([trace, sliding], [sliding, trace])):
+        tree = mesoslip.response(outputs, fit=False)
+        assert force_scale(tree).startswith("Forces are not divided by a static force")
+        of_trace = tree["steady"]["output_index"].values == place
+        assert tree["steady"]["steady_force"].values[of_trace] == pytest.approx([5], rel=1e-3)
+    for one in (sliding, trace):
+        with pytest.raises(mesoslip.FileError, match="input 1: is given twice"):
+            mesoslip.response([one, one], fit=False)
 
 
 def test_stick_slip_is_stated_and_not_fitted():

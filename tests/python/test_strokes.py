@@ -427,6 +427,9 @@ def test_revolutions_of_a_disc() -> None:
     assert "groups of 4 revolutions" in found.attrs["notes"]
     with pytest.raises(mesoslip.FileError, match="whole revolutions"):
         mesoslip.strokes(record_tree(time[::300], force[::300], revolutions=0.8 * time[::300]))
+    for period in (1e-30, 0.0199):
+        with pytest.raises(mesoslip.FileError, match="shorter than two samples, 20 ms"):
+            mesoslip.strokes(record_tree(time, force), period=period)
 
 
 def test_falls_of_the_track_of_a_disc_are_no_slips(tmp_path) -> None:  # type: ignore[no-untyped-def]
@@ -532,7 +535,7 @@ def test_a_few_slips_at_the_end_of_a_stroke_are_sliding(number, tmp_path):
 
 def test_a_force_of_one_sign_may_be_partial_slip_in_strokes() -> None:
     """With an offset, also in noise of a tenth; the force of slips in one direction is not."""
-    for number in (1031, 1441, 1129, 1316):
+    for number in (1031, 1441, 1129, 1316, 5014):
         record = made(number)
         pieces = pieces_of_force(record.time, record.force)
         assert pieces is not None
@@ -578,6 +581,34 @@ def test_a_fall_or_two_among_thousands_of_samples_are_noise(number, tmp_path):
     """Many minimum falls are tried, and the ratios of few rises and falls are not normal."""
     made(number).write(tmp_path / "a.csv")
     assert mesoslip.read_trace(tmp_path / "a.csv")["slips"].sizes["slip"] == 0
+
+
+@pytest.mark.parametrize("number", [3050, 3101, 6079, 6136])
+def test_partial_slip_has_no_slips(number, tmp_path):
+    """Its force bends, and reversals are found late without a load point, as at the last one."""
+    made(number).write(tmp_path / "a.csv")
+    assert mesoslip.read_trace(tmp_path / "a.csv")["slips"].sizes["slip"] == 0
+
+
+@pytest.mark.parametrize("number", [3191, 6103])
+def test_slips_in_strokes_are_those_of_the_slider(number, tmp_path):
+    """Neither noise at rests nor reversals, of which the last is at the end of the record."""
+    record = made(number)
+    record.write(tmp_path / "a.csv")
+    slips = mesoslip.slips(mesoslip.read_trace(tmp_path / "a.csv"))
+    near = 4 * record.time[1]
+    spans = zip(slips["start_time"].values - near, slips["end_time"].values + near, strict=True)
+    assert all(((record.slips >= one) & (record.slips <= two)).any() for one, two in spans)
+    assert slips.sizes["slip"] > 0.8 * record.slips.size
+
+
+def test_slips_before_a_rest_are_found(tmp_path):
+    """The force rises faster after a reversal than it falls at rest: that is no mirrored slip."""
+    record = made(3041)
+    record.write(tmp_path / "a.csv")
+    tree = mesoslip.read_trace(tmp_path / "a.csv")
+    assert tree["slips"].sizes["slip"] > 0.65 * record.slips.size
+    assert tree["slip_counts"]["mirrored_count"].values.max() == 0
 
 
 def test_the_sign_of_a_force_in_partial_slip_is_by_the_energy(tmp_path):

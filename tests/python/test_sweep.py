@@ -295,6 +295,8 @@ def test_lines_of_theory_are_smooth_and_scales_follow_the_data():
     delays, stiffnesses = np.logspace(-4, -2, 6), np.logspace(1.5, 3, 5)
     dimensions = ("contacts.delay", "slider.stiffness", "realization")
     product = (delays[:, None] * stiffnesses)[..., None]
+    mean_force = 1e-6 * (1 + product)
+    mean_force[1, 3] = np.nan
     flags = {"flag_meanings": "smooth stick_slip irregular transient"}
     data = xr.Dataset(
         {
@@ -302,7 +304,7 @@ def test_lines_of_theory_are_smooth_and_scales_follow_the_data():
             "regime": (dimensions, np.where(product > 0.5, 0.0, 1.0), flags),
             "growth_rate": (dimensions, 0.5 - product, {"units": "s-1"}),
             "mean_waiting_time": (dimensions, 1 / product, {"units": "s"}),
-            "mean_force": (dimensions, 1e-6 * (1 + product), {"units": "N"}),
+            "mean_force": (dimensions, mean_force, {"units": "N"}),
         },
         {"contacts.delay": delays, "slider.stiffness": stiffnesses, "realization": [0]},
         {"configuration": ""},
@@ -333,9 +335,12 @@ def test_lines_of_theory_are_smooth_and_scales_follow_the_data():
     assert waiting.collections[0].norm.vmin == pytest.approx(1 / product[..., 0][slips].max())
     (marks,) = waiting.lines
     assert len(marks.get_xdata()) == np.count_nonzero(~slips)
-    assert not force.lines
+    # A point without a value is marked as such.
+    (unknown,) = force.lines
+    point = [[1e3 * delays[1], 1e-3 * stiffnesses[3]]]
+    np.testing.assert_allclose(unknown.get_xydata(), point)
     (legend,) = figure.legends
-    assert [one.get_text() for one in legend.get_texts()][-1] == "smooth"
+    assert [one.get_text() for one in legend.get_texts()][-2:] == ["smooth", "no value"]
     assert legend.get_title().get_text() == "one realization of each point"
     figure.draw_without_rendering()
     shown = [one for one in regime.get_xticklabels() if one.get_text()]

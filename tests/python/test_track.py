@@ -254,6 +254,13 @@ def test_theories_that_do_not_know_a_track_refuse_it(klein):
         TrackResponse(config.replace({"contacts.newborn_width": 0.05}))
     with pytest.raises(ConfigError, match=r"contacts\.track"):
         track_strength(klein(), 0.0)
+    # Each of two tables has a theory, both together have none.
+    hot = config.replace({"run.engine": "eq", "contacts.coupling": "equal"})
+    hot = hot.replace({"contacts.thermal": {"rate": 1e4, "force_ratio": 0.05}})
+    with pytest.raises(ConfigError, match=r"thermal: .* with contacts\.track: leave one of them"):
+        mesoslip.derived(hot)
+    for one in ("track", "thermal"):
+        mesoslip.derived(hot.replace({f"contacts.{one}": None}))
 
 
 def test_a_track_that_is_cut_off_is_reported(klein):

@@ -1,6 +1,7 @@
 """Steps and vibrations of the normal load beside their closed forms: ``docs/normal-load.png``.
 
-Left, the ready run ``load-step``: force and coefficient, with the force curve of relaxed contacts.
+Left, the ready run ``load-step`` with shorter stages: force and coefficient, with the force curve
+of relaxed contacts.
 Right, the ready run ``vibrating-load`` and its sweep, with the limits of fast and slow vibration.
 """
 
@@ -17,6 +18,8 @@ from mesoslip import Config
 ROOT = Path(__file__).parents[2]
 RUNS = ROOT / "runs"
 BLUE, GREY = "C0", "0.5"
+# Duration of a stage in the picture [s].
+STAGE = 0.6
 
 
 def beside(axes, time, load, top):
@@ -30,21 +33,24 @@ def beside(axes, time, load, top):
 def draw_steps(force, coefficient):
     """Force and coefficient in the steps of the load."""
     config = Config.load(RUNS / "load-step.toml")
+    stages = [
+        {"duration": STAGE, "normal_force": one.normal_force} for one in config.normal_load.stage
+    ]
+    config = config.replace({"run.duration": len(stages) * STAGE, "load.stage": stages})
     root = mesoslip.run(config).to_dataset().mean("realization")
     time = root["time"].values
     force.plot(time, 1e6 * root["spring_force"], color=BLUE, lw=1, label="force")
     relaxed = {"load": None, "contacts.initial": "relaxed"}
     curve = mesoslip.curve(config.replace(relaxed))
-    stage = config.normal_load.stage[0].duration
-    after = (time > stage) & (time <= 2 * stage)
-    moved = config.drive_speed * (time[after] - stage)
+    after = (time > STAGE) & (time <= 2 * STAGE)
+    moved = config.drive_speed * (time[after] - STAGE)
     steady = mesoslip.derived(config)["F_steady"].value
     new = np.interp(moved, curve["displacement"], curve["contact_force"])
     expected = "$[L_1 F_{ss} + (L_2 - L_1) F_0(X)]/L_0$"
     force.plot(time[after], 1e6 * (steady + 0.5 * new), "k--", lw=1, label=expected)
-    for start in (0, 2 * stage):
+    for start in (0, 2 * STAGE):
         label = "$F_{ss} L/L_0$" if start else None
-        force.plot([start, start + stage], 2 * [1e6 * steady], "k:", lw=1, label=label)
+        force.plot([start, start + STAGE], 2 * [1e6 * steady], "k:", lw=1, label=label)
     force.set(xlabel="time (s)", ylabel="force (µN)", ylim=(0, 16.5))
     force.legend(loc="lower right")
     beside(force, time, root["normal_force"].values, 110)

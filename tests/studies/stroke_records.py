@@ -249,6 +249,8 @@ class Verdict:
     false_slips: int
     found_slips: int
     true_slips: int
+    late_ends: int
+    """Found slips that end more than four samples from where they do."""
     limit: float
     """Stated lower limit of the friction of sliding over that friction; NaN if it is not stated."""
     deviations: dict[str, float]
@@ -273,22 +275,28 @@ def judged(record: Made) -> Verdict:
         bool(((record.turns > one - interval) & (record.turns < two + interval)).any())
         for one, two in zip(starts, stops, strict=True)
     ]
+    near = 4 * interval
     real = [
-        record.slips.size > 0 and float(np.abs(record.slips - two).min()) <= 4 * interval
+        bool(((record.slips >= one - near) & (record.slips <= two + near)).any())
         for one, two in zip(starts, stops, strict=True)
     ]
+    late = sum(
+        is_real and float(np.abs(record.slips - two).min()) > near
+        for is_real, two in zip(real, stops, strict=True)
+    )
     reversals = sum(one and not two for one, two in zip(crossing, real, strict=True))
     false = len(real) - sum(real)
     try:
         found = strokes_of(tree)
     except FileError:
-        return Verdict(False, reversals, false, sum(real), record.slips.size, math.nan, {}, {})
+        counts = (reversals, false, sum(real), record.slips.size, late)
+        return Verdict(False, *counts, math.nan, {}, {})
     begun = np.array([one.start_time for one in found.strokes[0]])
     period = 2 * float(np.median(np.diff(record.turns)))
     expected = record.turns[:-1]
-    near = [float(np.abs(begun - one).min()) < 0.12 * period for one in expected]
+    is_found = [float(np.abs(begun - one).min()) < 0.12 * period for one in expected]
     # The first and the last may be too short to be seen, or be seen as parts.
-    right = all(near[1:-1]) and len(expected) - 2 <= begun.size <= len(expected)
+    right = all(is_found[1:-1]) and len(expected) - 2 <= begun.size <= len(expected)
     truths = {
         "mean_friction": record.friction,
         "loop_energy": record.loop_energy,
@@ -307,7 +315,7 @@ def judged(record: Made) -> Verdict:
         scale = record.friction if name == "offset" else abs(value)
         relative[name] = (one.mean - value) / scale
     limit = math.nan if found.min_friction is None else found.min_friction.value / record.strength
-    counts = (right, reversals, false, sum(real), record.slips.size)
+    counts = (right, reversals, false, sum(real), record.slips.size, late)
     return Verdict(*counts, limit, deviations, relative)
 
 
@@ -347,7 +355,8 @@ def report(verdicts: Sequence[Verdict]) -> None:
     found, there = (
         sum(getattr(one, key) for one in verdicts) for key in ("found_slips", "true_slips")
     )
-    print(f"slips found: {found} of {there}")
+    late = sum(one.late_ends for one in verdicts)
+    print(f"slips found: {found} of {there}, {late} with an end more than 4 samples off")
     limits = np.array([one.limit for one in verdicts if math.isfinite(one.limit)])
     print(f"lower limits of friction: {limits.size}, above it {int((limits > 1.01).sum())}")
     for quantity in QUANTITIES:

@@ -70,9 +70,9 @@ contains
       class(population_state_type), intent(inout) :: self
       real(wp), intent(in) :: share
 
-      real(wp) :: before(self%bins()), after(self%bins())
+      real(wp) :: before(size(self%edge) - 1), after(size(self%edge) - 1)
 
-      associate (low => self%edge(:self%bins()), high => self%edge(2:))
+      associate (low => self%edge(:size(before)), high => self%edge(2:))
          before = max(0.0_wp, min(self%share, high) - low)
          after = max(0.0_wp, min(share, high) - low)
       end associate

@@ -326,11 +326,12 @@ contains
                & join_part * self%step, (1.0_wp - max_loss) * moments(number))
          end if
          if (row > 0) then
-            call self%join(row, origin, self%share(class) * births * moments, displacement, time, &
-               & lost)
+            call self%join(row, origin, self%class_broken(class), &
+               & self%share(class) * births * moments, displacement, time, lost)
          else if (joins) then
             call self%join_last(self%count - self%classes + class, origin, birth, &
-               & births * self%newborn_share(class), mean_force, displacement, time, lost)
+               & self%class_broken(class), births * self%newborn_share(class), mean_force, &
+               & displacement, time, lost)
          else
             call self%add(origin, force, self%factor, self%share(class) * births, &
                & self%law_of(class, direction), self%class_broken(class), displacement, birth, &

@@ -116,7 +116,7 @@ module mesoslip_contacts_populations_rows
       !> count or more), and those of the next one, shape (bins)
       real(wp), allocatable :: mix(:, :), newborn_mix(:)
    contains
-      procedure, non_overridable :: add, row_to_join, join, shift_row, next_break, &
+      procedure, non_overridable :: add, row_to_join, join, mean_broken, shift_row, next_break, &
          & update_thresholds, &
          & sum_forces, shift_origin, number_of_contacts, elastic_energy, scale_all, sum_bin, &
          & exchange
@@ -204,10 +204,11 @@ contains
    end function row_to_join
 
    !> Let contacts that attach at an origin [m] join a population of contacts alike.
-   subroutine join(self, row, origin, moments, displacement, time, energy)
+   subroutine join(self, row, origin, broken, moments, displacement, time, energy)
       class(population_rows_type), intent(inout) :: self
       integer, intent(in) :: row
-      real(wp), intent(in) :: origin
+      !> Their origin, and the threshold up to which they have broken
+      real(wp), intent(in) :: origin, broken
       !> Moments of these contacts
       real(wp), intent(in) :: moments(moments_length)
       !> Displacement of the slider [m], and time [s]
@@ -227,12 +228,26 @@ contains
          population(row, column_origin) = population(row, column_origin) + part * shift
          if (allocated(self%mix)) self%mix(:, row) = self%mix(:, row) + moments(number) &
             & / (left(number) + moments(number)) * (self%newborn_mix - self%mix(:, row))
+         call self%mean_broken(row, moments(number) / (left(number) + moments(number)), broken)
          left = left + moments
          call self%moments(1)%interpolate(population(row, column_broken), all)
          population(row, column_weight) = left(number) / all(number)
       end associate
       call self%find_next_breaks(row, displacement, time)
    end subroutine join
+
+   !> Let a population have broken up to the mean threshold up to which its contacts and others that
+   !> join it have broken: these have not broken with the others, and would never do so.
+   pure subroutine mean_broken(self, row, part, broken)
+      class(population_rows_type), intent(inout) :: self
+      integer, intent(in) :: row
+      !> Part of the contacts that join, and the threshold up to which they have broken
+      real(wp), intent(in) :: part, broken
+
+      associate (mean => self%population(row, column_broken))
+         mean = mean + part * (max(broken, self%first_broken) - mean)
+      end associate
+   end subroutine mean_broken
 
    !> Shift the origin of a population [m], and the time at which it attached.
    subroutine shift_row(self, row, shift, slowness, displacement, time, energy)

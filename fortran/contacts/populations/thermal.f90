@@ -291,11 +291,13 @@ contains
    end subroutine begin_hazard
 
    !> Let contacts that attach join a population that attached close by.
-   subroutine join_last(self, row, origin, birth, contacts, force, displacement, time, energy)
+   subroutine join_last(self, row, origin, birth, broken, contacts, force, displacement, time, &
+      & energy)
       class(thermal_populations_type), intent(inout) :: self
       integer, intent(in) :: row
-      !> Where [m] and when [s] they attach, their number, and the force on them
-      real(wp), intent(in) :: origin, birth, contacts, force
+      !> Where [m] and when [s] they attach, the threshold up to which they have broken, their
+      !> number, and the force on them
+      real(wp), intent(in) :: origin, birth, broken, contacts, force
       !> Displacement of the slider [m], and time [s]
       real(wp), intent(in) :: displacement, time
       !> Elastic energy, to which that lost by giving all contacts one origin is added [J]
@@ -330,6 +332,7 @@ contains
          if (allocated(self%mix)) then
             self%mix(:, row) = self%mix(:, row) + part * (self%newborn_mix - self%mix(:, row))
          end if
+         call self%mean_broken(row, part, broken)
          population(row, column_weight) = all / self%number_left(row)
          self%left(:, row) = all
          population(row, column_ahead) = max(displacement, self%next_break(row, 1.0_wp, time))

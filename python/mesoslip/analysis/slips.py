@@ -46,6 +46,8 @@ COLUMNS = (
     "contacts_broken",
     *ADDED,
 )
+# Those of a run with a normal load.
+LOAD_COLUMNS = ("normal_force", "friction_coefficient")
 # Printed columns: header, and SI unit.
 HEADS = {
     "start_time": ("start", "s"),
@@ -55,6 +57,8 @@ HEADS = {
     "force_drop": ("force drop", "N"),
     "peak_velocity": ("peak velocity", "m/s"),
     "contacts_broken": ("breaks", "1"),
+    "normal_force": ("normal force", "N"),
+    "friction_coefficient": ("coefficient", "1"),
     "waiting_time": ("waiting time", "s"),
     "stick_duration": ("stick duration", "s"),
     "loading_rate": ("loading rate", "N/s"),
@@ -85,7 +89,8 @@ class Column(NamedTuple):
 
 @dataclass(frozen=True)
 class Catalogue:
-    """The columns `COLUMNS` of the slips of an output; the force unit is "N" or "1"."""
+    """The columns `COLUMNS` of the slips of an output, and with a normal load `LOAD_COLUMNS`; the
+    force unit is "N" or "1"."""
 
     columns: Mapping[str, Column]
     force_unit: str
@@ -93,7 +98,7 @@ class Catalogue:
     @property
     def rows(self) -> list[dict[str, Any]]:
         """A dictionary for each slip; None for unknown values."""
-        return rows_of({name: self.columns[name].values for name in COLUMNS})
+        return rows_of({name: one.values for name, one in self.columns.items()})
 
     @property
     def statistics(self) -> dict[str, dict[str, float]]:
@@ -101,7 +106,9 @@ class Catalogue:
         column, in SI."""
         count = float(len(self.columns["start_time"].values))
         result: dict[str, dict[str, float]] = {"slips": {"count": count}}
-        for name in COLUMNS[3:]:
+        for name in (*COLUMNS[3:], *LOAD_COLUMNS):
+            if name not in self.columns:
+                continue
             values = self.columns[name].values
             values = values[np.isfinite(values)]
             if values.size:
@@ -115,7 +122,7 @@ class Catalogue:
 
     def write_csv(self, path: Path) -> None:
         """Write the catalogue as a table with the units in its header."""
-        write_table(self.rows, {name: self.columns[name].unit for name in COLUMNS}, path)
+        write_table(self.rows, {name: one.unit for name, one in self.columns.items()}, path)
 
     @property
     def tables(self) -> list[PrintedTable]:
@@ -150,6 +157,8 @@ class Catalogue:
         """Name, header and number format of each column that has a known value."""
         rows = self.rows
         for name, heading in HEADS.items():
+            if name not in self.columns:
+                continue
             values = [row[name] for row in rows]
             if rows and all(one is None for one in values):
                 continue
@@ -187,7 +196,7 @@ def catalogue_of(tree: Tree, realization: int | None = None) -> Catalogue:
     }
     columns = {
         name: Column(added[name], *ADDED[name]) if name in added else _column(data, name)
-        for name in COLUMNS
+        for name in _columns_of(data)
     }
     unit = apparatus.force_unit
     return Catalogue(
@@ -198,8 +207,12 @@ def catalogue_of(tree: Tree, realization: int | None = None) -> Catalogue:
 
 def catalogue_from(data: Dataset) -> Catalogue:
     """The catalogue that `slips` returned."""
-    columns = {name: _column(data, name) for name in COLUMNS}
+    columns = {name: _column(data, name) for name in _columns_of(data)}
     return Catalogue(columns, columns["force_drop"].unit)
+
+
+def _columns_of(data: Dataset | Arrays) -> tuple[str, ...]:
+    return (*COLUMNS, *(name for name in LOAD_COLUMNS if name in data))
 
 
 def _column(data: Dataset | Arrays, name: str) -> Column:

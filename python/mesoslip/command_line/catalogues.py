@@ -14,6 +14,7 @@ from mesoslip.command_line.options import (
     OutputArgument,
     TableOption,
     counted,
+    format_option,
     option,
     positive_or_none,
     print_json,
@@ -188,7 +189,7 @@ def fronts(
     table: TableOption = None,
     as_json: JsonOption = False,
     as_latex: Annotated[
-        bool, typer.Option("--latex", help="Print the statistics by kind as a LaTeX table")
+        bool, format_option("--latex", "Print the statistics by kind as a LaTeX table")
     ] = False,
 ) -> None:
     """Print fronts and precursors of an interface with a length."""
@@ -285,7 +286,7 @@ def strokes(
     table: TableOption = None,
     as_json: JsonOption = False,
     as_latex: Annotated[
-        bool, typer.Option("--latex", help="Print the means over cycles as a LaTeX table")
+        bool, format_option("--latex", "Print the means over cycles as a LaTeX table")
     ] = False,
     middle: Annotated[
         str, option("Share of a stroke over which friction is averaged, in its middle", "SHARE")

@@ -104,10 +104,11 @@ def _fitted(
     from mesoslip.inference.fit_trace import as_plan
     from mesoslip.inference.fit_trace import fit as fit_traces
     from mesoslip.output import files, targets, writing
+    from mesoslip.output.inputs import distinct
 
     targets.check_output(path, [*traces, config])
     store = path.with_name(f"{path.stem}.simulations")
-    trees = [files.read_run(one) for one in traces]
+    trees = [files.read_run(one) for one in distinct(traces)]
     plan = as_plan(config, trees, changes)
     with stored_on_full_disk(store, "simulation"):
         with interruptible(path, quiet, f"; the same command continues from {store}") as work:

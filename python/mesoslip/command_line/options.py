@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, Protocol, TypeVar
 
 import typer
 
-from mesoslip.errors import WriteError
+from mesoslip.errors import ConfigError, Problem, WriteError
 
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
@@ -51,6 +51,22 @@ def option(
     """An option with a value, which the metavar stands for."""
     made: typer.models.OptionInfo = typer.Option(*names, help=help_text, metavar=metavar, **limits)
     return made
+
+
+def format_option(name: str, help_text: str) -> typer.models.OptionInfo:
+    """A flag that has a command print another format; only one may be given."""
+    made: typer.models.OptionInfo = typer.Option(name, help=help_text, callback=_only_format)
+    return made
+
+
+def _only_format(context: typer.Context, parameter: typer.CallbackParam, is_given: bool) -> bool:
+    """Refuse a second format, whose order on the command line does not matter."""
+    if is_given:
+        name = parameter.opts[0]
+        first = context.meta.setdefault("format", name)
+        if first != name:
+            raise ConfigError([Problem("", name, f"does not go with {first}: give one format")])
+    return is_given
 
 
 def output_option(help_text: str, metavar: str = "OUT.nc") -> typer.models.OptionInfo:
@@ -106,8 +122,8 @@ TableOption = Annotated[
         "--csv",
     ),
 ]
-JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON, in SI units")]
-LatexOption = Annotated[bool, typer.Option("--latex", help="Print a LaTeX table")]
+JsonOption = Annotated[bool, format_option("--json", "Print JSON, in SI units")]
+LatexOption = Annotated[bool, format_option("--latex", "Print a LaTeX table")]
 # Rows of a table that are printed.
 MAX_ROWS = 20
 QuietOption = Annotated[bool, typer.Option("--quiet", help="Print no progress")]
@@ -295,7 +311,6 @@ def quantity(
 ) -> float:
     """The value of an option that is a quantity, in SI."""
     from mesoslip.configuration.units import text_to_si
-    from mesoslip.errors import ConfigError, Problem
 
     try:
         value = text_to_si(text, unit, example)
@@ -315,7 +330,6 @@ def positive_or_none(text: str | None, option: str, unit: str, example: str) -> 
 
 def share(text: str, option: str) -> float:
     """The value of an option that is a share of a whole, such as "80%" or 0.8."""
-    from mesoslip.errors import ConfigError, Problem
 
     number, mark, rest = text.strip().partition("%")
     try:

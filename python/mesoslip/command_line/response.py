@@ -12,6 +12,7 @@ from mesoslip.command_line.options import (
     JsonOption,
     QuietOption,
     TableOption,
+    format_option,
     interruptible,
     option,
     output_option,
@@ -44,10 +45,10 @@ def response(
         ),
     ] = False,
     as_latex: Annotated[
-        bool, typer.Option("--latex", help="Print rate-and-state parameters as a LaTeX table")
+        bool, format_option("--latex", "Print rate-and-state parameters as a LaTeX table")
     ] = False,
     as_markdown: Annotated[
-        bool, typer.Option("--markdown", help="Print rate-and-state parameters as a Markdown table")
+        bool, format_option("--markdown", "Print rate-and-state parameters as a Markdown table")
     ] = False,
     posterior: Annotated[
         bool,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from itertools import pairwise
 from pathlib import Path
@@ -34,6 +35,8 @@ if TYPE_CHECKING:
 INTERRUPTED = 130
 # Expected size of an output that is reported before the run [bytes].
 LARGE = 5e8
+# Expected time of changes of the load that is reported before the run [s].
+LONG = 60.0
 # Rows of the trace that are read at once.
 MAX_ROWS = 400_000
 
@@ -67,6 +70,7 @@ def run(
     A checkpoint is written beside the output, as NAME.checkpoint, every minute and when the run is
     stopped by Ctrl-C, SIGTERM or SIGHUP. The same command with --resume continues from it.
     """
+    from mesoslip.configuration.contacts.base import LOAD_CHANGE_SECONDS
     from mesoslip.output import files, targets, writing
     from mesoslip.simulation.checkpoint import Checkpoint, checkpoint_folder
     from mesoslip.simulation.memory import check_memory, output_bytes
@@ -91,6 +95,12 @@ def run(
         report(
             f"the output will take about {expected / 1e9:.2g} GB; output.interval and "
             "output.slip_interval set how fine it is"
+        )
+    touches = checked.run.realizations * checked.contact_kind.load_changes(checked)
+    if not quiet and touches * LOAD_CHANGE_SECONDS > LONG:
+        report(
+            f"contacts will touch or separate about {touches:.1g} times as the load changes, which "
+            f"takes some {touches * LOAD_CHANGE_SECONDS:.1g} s of processor time"
         )
     folder = checkpoint_folder(path)
     with (
@@ -178,7 +188,7 @@ def _report_results(results: Results, config: Config, path: Path, stop: Stop) ->
     else:
         say(f"{path}: {_regimes(results, path, stop)}")
     if known["break_count"] == 0:
-        say(f"{path}: no contact broke: the drive did not move far enough")
+        say(f"{path}: no contact broke: {_short_drive(config)}")
     if known["audit"] != "passed":
         say(f"{path}: warning: {known['audit']}")
     if config.contacts.weak_track is not None:
@@ -194,6 +204,17 @@ def _report_results(results: Results, config: Config, path: Path, stop: Stop) ->
         say(f"{path}: {config.continued_drive}")
     if known["ending"] != ENDINGS["drive"]:
         say(f"{path}: end of the run: {known['ending']}")
+
+
+def _short_drive(config: Config) -> str:
+    """Why no contact broke: how far the drive moved, and how far it loads the spring to F_s."""
+    from mesoslip.quantities import with_unit
+
+    if not 0 < config.spring_stiffness < math.inf:
+        return "the drive did not move far enough"
+    path_length = math.fsum(part.path_length for part in config.drive_parts)
+    needed = config.contacts.static_force / config.spring_stiffness
+    return f"the drive moves {with_unit(path_length, 'm')}, and F_s/K is {with_unit(needed, 'm')}"
 
 
 def _regimes(results: Results, path: Path, stop: Stop) -> str:

@@ -214,6 +214,14 @@ class Load(Table):
         """Duration of its parts [s]; infinite without any."""
         return math.fsum(part.duration for part in self.parts) if self.parts else math.inf
 
+    def path_length(self, duration: float) -> float:
+        """Sum of the changes of the normal force in both directions, in a duration [s] of a cycle,
+        or in all parts [N]."""
+        if self.cycle is not None:
+            return 4 * self.cycle.amplitude * self.cycle.frequency * duration
+        ends = [force for part in self.parts for force in (part.start_force, part.end_force)]
+        return math.fsum(abs(after - before) for before, after in itertools.pairwise(ends))
+
     def site_count(self, count: int) -> int:
         """Number of contacts at the maximum of the load, given that at L_0."""
         return max(1, math.ceil(count * (self.max_force / self.normal_force) - TINY_SITE))

@@ -261,7 +261,7 @@ class TheoryView:
                 self.plot.figure.x_range, start=0.0, end=end, reset_start=0.0, reset_end=end
             )
         numbers = ", ".join(f"{name} = {value}" for name, value in shown.numbers)
-        text = ". ".join(one for one in (numbers, shown.summary) if one).replace("`", "")
+        text = "; ".join(one for one in (numbers, shown.summary) if one).replace("`", "")
         self._elements.show("theory", symbols=text)
 
 

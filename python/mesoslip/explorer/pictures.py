@@ -222,7 +222,7 @@ def motion(results: Results, measured: Measured | None = None) -> Motion:
     close, close_contact = _close_up(tree)
     numbers = [
         *_extremes(force),
-        ("breaks", f"{realization.breaks:.6g}"),
+        ("breaks", f"{realization.breaks:.0f}"),
         ("slips", str(tree["slips"].sizes["slip"])),
         ("computing time", with_unit(realization.kernel_seconds, "s", 3)),
     ]

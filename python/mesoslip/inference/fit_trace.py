@@ -22,7 +22,7 @@ from mesoslip.inference import fit as fits
 from mesoslip.inference.fit_plan import Known, Plan
 from mesoslip.inference.posterior import build_tree
 from mesoslip.inference.traced_experiment import MIN_SAMPLES
-from mesoslip.output.inputs import OutputLike, as_run, several, trace_name
+from mesoslip.output.inputs import OutputLike, as_run, distinct, several, trace_name
 
 
 @arguments.checked(progress=arguments.function)
@@ -81,7 +81,7 @@ def fit(
     >>> trace = mesoslip.read_trace("experiment.csv", rate=1e3, velocity=1e-7)
     >>> posterior = mesoslip.fit(trace, "fit.toml")  # doctest: +SKIP
     """
-    outputs = several(output)
+    outputs = distinct(several(output))
     if not outputs:
         raise FileError("there is no trace to fit")
     trees = [as_run(one) for one in outputs]

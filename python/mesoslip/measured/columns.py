@@ -326,6 +326,9 @@ def _from_headings(table: Table, headings: Mapping[int, Heading], found: Assignm
             _two(table, quantity, indices, headings, found)
         else:
             _use(table, quantity, indices[0], headings[indices[0]], found)
+    stamps = [one for one in table.clocks if one in headings and headings[one].quantity is None]
+    if "time" not in found.used and len(stamps) == 1:
+        found.used["time"] = Used(stamps[0], "s", 1.0)
     for index in either:
         found.unused[index] = "a displacement of the load point or of the slider?"
     if len(either) == 1 and not ({"load_point", "displacement"} <= found.used.keys()):

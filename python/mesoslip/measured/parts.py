@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -11,6 +12,8 @@ import numpy as np
 from mesoslip.array_types import Array
 from mesoslip.errors import FileError
 from mesoslip.measured.reading.table import BadCell, Table
+
+DAY = 86_400.0
 
 
 def joined(tables: Sequence[Table]) -> Table:
@@ -42,18 +45,32 @@ def joined(tables: Sequence[Table]) -> Table:
 def continued(time: Array, tables: Sequence[Table], column: int) -> tuple[Array, list[str]]:
     """Times of all rows of parts, and notes on parts whose clock starts again.
 
-    Time stamps with dates, of the column of the time, are seconds from the first part. Other times
-    follow the end of the part before by a usual interval.
+    Time stamps of the column of the time are seconds from the first part; those without dates are
+    of the day of the part before, or the next one. Other times follow the end of the part before by
+    a usual interval.
     """
     time, notes, start = time.copy() if len(tables) > 1 else time, [], 0
     for before, table in pairwise(tables):
         start += before.values.shape[1]
         earlier, rest = time[:start], time[start:]
-        if column in before.starts and column in table.starts:
-            rest += table.starts[column] - before.starts[column]
+        clocks = [one.clocks[column] for one in (before, table) if column in one.clocks]
+        are_dated = [one.chosen is not None and not one.chosen.is_open for one in clocks]
+        begun = clocks[1].start - clocks[0].start if len(clocks) == 2 else math.nan
+        if are_dated == [True, True]:
+            rest += begun
             continue
         known = rest[np.isfinite(rest)]
-        if not known.size or not np.isfinite(earlier).any() or known[0] > np.nanmax(earlier):
+        if not known.size or not np.isfinite(earlier).any():
+            continue
+        if [one.chosen for one in clocks] == [None, None]:
+            days = math.ceil((float(np.nanmax(earlier)) - begun - known[0]) / DAY)
+            rest += begun + DAY * max(0, days)
+            notes.append(
+                f"guess: {table.path.name} was recorded within a day after {before.path.name}, as "
+                "its time stamps have no dates"
+            )
+            continue
+        if known[0] > np.nanmax(earlier):
             continue
         steps = np.diff(known)
         rest += np.nanmax(earlier) - known[0] + float(np.median(steps[steps > 0]))

@@ -16,6 +16,7 @@ from mesoslip.analysis.apparatus import first_velocity
 from mesoslip.analysis.noise import TraceNoise, estimate_noise
 from mesoslip.analysis.sampled_slips import FoundSlips
 from mesoslip.analysis.strokes import (
+    FORCE,
     angle_of,
     are_of_track,
     back_and_forth,
@@ -39,7 +40,7 @@ from mesoslip.measured.measured_record import Record, RecordedColumn, read_recor
 from mesoslip.measured.output_groups import count_group, noise_group, slip_group, stage_group
 from mesoslip.measured.sampling import MAX_RATES
 from mesoslip.output import variables
-from mesoslip.output.inputs import ConfigLike
+from mesoslip.output.inputs import ConfigLike, distinct
 from mesoslip.output.provenance import program_attributes
 from mesoslip.quantities import with_unit
 
@@ -128,7 +129,7 @@ def understand(
         if given:
             message = "is given in the configuration; change it there"
             raise ConfigError([Problem("", option_name(name), message) for name in given])
-    record = read_record(paths, trace)
+    record = read_record(distinct(paths), trace)
     stiffness = _stiffness(record, trace) if model is None else model.spring_stiffness
     _check_units(record, trace, model)
     resolved = experiment.model_copy(update={"trace": resolve(trace, record)})
@@ -316,6 +317,7 @@ def trace_of(understood: Understood) -> DataTree:
         record.time,
         record.force,
         noise=noise,
+        are_guessed=cut_by == FORCE,
         period=period,
         direction=direction,
         min_fall=trace.si("min_fall"),

@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias, cast
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar, cast
 
 from mesoslip.array_types import Dataset, DataTree
 from mesoslip.configuration.config import Config
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 ConfigLike: TypeAlias = PathLike | Mapping[str, Any] | Config
 OutputLike: TypeAlias = "PathLike | DataTree | Dataset"
+Input = TypeVar("Input")
 
 
 def as_config(config: ConfigLike, overrides: Iterable[str] = ()) -> Config:
@@ -122,6 +123,18 @@ def several(output: OutputLike | Sequence[OutputLike]) -> Sequence[OutputLike]:
     if isinstance(output, str | os.PathLike) or not isinstance(output, Sequence):
         return [output]
     return output
+
+
+def distinct(inputs: Sequence[Input]) -> Sequence[Input]:
+    """Files or trees that count as independent; the same one twice is refused."""
+    seen = set()
+    for number, one in enumerate(inputs):
+        is_file = isinstance(one, str | os.PathLike)
+        key = os.path.realpath(cast("PathLike", one)) if is_file else id(one)
+        if key in seen:
+            raise FileError(f"{one if is_file else f'input {number}'}: is given twice")
+        seen.add(key)
+    return inputs
 
 
 def opened(

@@ -70,7 +70,7 @@ def program_attributes(config: Described, command: str) -> dict[str, Any]:
     base = config.base
     return {
         "Conventions": "CF-1.11, ACDD-1.3",
-        "title": config.title or "Stick-slip of a multicontact interface",
+        "title": config.title or "Friction of a multicontact interface",
         "summary": SUMMARIES[command],
         "keywords": "friction, stick-slip, multicontact interface, earthquake-like model",
         "source": program,

@@ -146,8 +146,8 @@ def draw_directions(axes: Axes, data: Dataset, one: Measured, key: SweptKey) -> 
 def draw_map(
     axes: Axes, one: Measured, keys: list[SweptKey], norm: Normalize | None = None
 ) -> list[Line2D]:
-    """Draw a measure over two keys by a norm, points without cycles in grey; returns marks for a
-    legend."""
+    """Draw a measure over two keys by a norm, points without cycles or value in grey; returns marks
+    for a legend."""
     order = np.ix_(*(key.order for key in keys))
     shown = one.shown[order].T
     edges = keys[0].edges, keys[1].edges
@@ -161,15 +161,16 @@ def draw_map(
     bar = axes.figure.colorbar(mesh, ax=axes, label=one.label)
     if isinstance(norm, LogNorm):
         label_powers(bar.ax.yaxis)
-    if one.regimes is None or has_cycles.all():
-        return []
-    grey = np.ma.masked_array(np.zeros(shown.shape), has_cycles)
+    blank = np.ma.getmaskarray(cells)
+    grey = np.ma.masked_array(np.zeros(shown.shape), ~blank)
     axes.pcolormesh(*edges, grey, cmap=ListedColormap([BLANK]), rasterized=True, zorder=0.9)
+    marks = [("no value", "_", blank & has_cycles)]
+    if one.regimes is not None:
+        regimes = one.regimes[order].T
+        marks += [(*mark, regimes == code) for code, mark in WITHOUT_CYCLES.items()]
     handles = []
-    regimes = one.regimes[order].T
     x, y = np.meshgrid(*(key.values[key.order] for key in keys))
-    for code, (label, marker) in WITHOUT_CYCLES.items():
-        there = regimes == code
+    for label, marker, there in marks:
         if there.any():
             style: dict[str, Any] = {"marker": marker, "color": "0.35", "markerfacecolor": "none"}
             style |= {"linestyle": "", "markersize": 3.5, "markeredgewidth": 0.7, "label": label}

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from mesoslip.configuration.config import Config
+from mesoslip.configuration.contacts.base import LOAD_CHANGE_SECONDS
 from mesoslip.output.inputs import ConfigLike, as_config
 from mesoslip.theory.contacts import contact_theory
 from mesoslip.theory.linear_stability import LinearStability, shown_by
@@ -99,6 +100,14 @@ def overview(config: Config, found: dict[str, Derived]) -> dict[str, Derived]:
             "breaks of steady sliding along the whole drive, about the most there will be: fewer "
             "while it loads, and where slips pass detached contacts; engine eq: 0.1 to 0.5 µs each "
             "for most contacts",
+        )
+    changes = config.contact_kind.load_changes(config)
+    if changes > 0:
+        first["load_changes"] = Derived(
+            changes,
+            "1",
+            "contacts that touch or separate as the load changes: "
+            f"{LOAD_CHANGE_SECONDS * 1e6:g} µs each",
         )
     return first
 

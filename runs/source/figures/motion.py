@@ -124,7 +124,7 @@ def layers(trees: Sequence[xr.DataTree]) -> Figure:
                 )
             draw_series(inset, tree, name, window=(0, 6), linewidth=0.5, color=color)
         low, high = axes.get_ylim()
-        axes.set_ylim(low, high + 0.7 * (high - low))
+        axes.set_ylim(low, high + 0.9 * (high - low))
         inset.tick_params(labelsize=6)
         inset.set_xlabel("time (s)", fontsize=6)
         axes.set(xlabel="time in the first slip (ms)", ylabel=f"({letter}) {title} (µN)")

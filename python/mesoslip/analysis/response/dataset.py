@@ -42,7 +42,7 @@ from mesoslip.array_types import DataTree
 from mesoslip.configuration import arguments
 from mesoslip.errors import FileError
 from mesoslip.output.arrays import Arrays, Tree, Values, Variable, in_xarray
-from mesoslip.output.inputs import OutputLike, opened_run_arrays, several
+from mesoslip.output.inputs import OutputLike, distinct, opened_run_arrays, several
 from mesoslip.output.table_files import write_table
 from mesoslip.output.variables import Group, with_force_unit
 
@@ -147,7 +147,7 @@ def response_arrays(
                 stack.enter_context(opened_run_arrays(one)),
                 os.fspath(one) if isinstance(one, str | os.PathLike) else f"output {number}",
             )
-            for number, one in enumerate(several(output))
+            for number, one in enumerate(distinct(several(output)))
         ]
         return response_of(
             experiments,
@@ -187,8 +187,8 @@ def response_of(
     for name, group in GROUPS.items():
         made = (group.rows_of(one, number) for number, one in enumerate(analysed))
         parts[name] = _part(group, fits if name == "rate_and_state" else [*chain(*made)])
-    # Unknown without a configuration.
-    static = {one.static_force for one in experiments if not math.isnan(one.static_force)}
+    # NaN without a configuration.
+    static = {one.static_force for one in experiments}
     attributes: dict[str, Any] = {"outputs": [one.name for one in experiments]}
     scaled: Callable[[Arrays], Arrays] | None = None
     if are_coefficients:
@@ -197,8 +197,7 @@ def response_of(
     elif normal_force is not None:
         attributes["normal_force"] = normal_force
         scaled = partial(_with_ratios, scale=normal_force, suffix="coefficient", of="normal force")
-    elif len(static) == 1:
-        (force,) = static
+    elif len(static) == 1 and math.isfinite(force := min(static)):
         attributes["static_force"] = force
         scaled = partial(_with_ratios, scale=force, suffix="ratio", of="static force")
     if scaled is not None:

@@ -10,6 +10,7 @@ import numpy as np
 from mesoslip.analysis.experiment_stages import Experiment, Stage
 from mesoslip.analysis.response.columns import HOLDS, STEADY, empty_row
 from mesoslip.analysis.response.line import Line, line
+from mesoslip.analysis.response.steps import load_steps
 from mesoslip.analysis.steady_force import SteadyMean, error_of_mean, scatter
 from mesoslip.analysis.strokes import strokes_of
 from mesoslip.errors import FileError
@@ -82,6 +83,8 @@ def _note(experiment: Experiment, stage: Stage, mean: SteadyMean) -> str:
     notes = []
     if experiment.is_stick_slip(stage):
         notes.append("stick-slip: the mean over its cycles")
+    if load_steps(experiment, stage):
+        notes.append("the mean over several normal forces")
     if not mean.is_steady:
         notes.append("not steady: the force still drifts")
     if not mean.is_resolved:

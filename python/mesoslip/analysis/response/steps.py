@@ -11,7 +11,6 @@ from mesoslip.analysis.experiment_stages import Experiment, Peak, Stage
 from mesoslip.analysis.response.columns import LOAD_STEPS, STEPS, empty_row
 from mesoslip.analysis.response.line import decay
 from mesoslip.analysis.steady_force import SteadyMean, error_of_mean, steady_mean
-from mesoslip.array_types import Array
 from mesoslip.quantities import with_unit
 
 # Minimum height of a peak above the steady force, in standard deviations of the force.
@@ -165,14 +164,16 @@ MIN_SAMPLES = 16
 MIN_TRANSIENT = 3.0
 
 
-class _Step(NamedTuple):
+class LoadStep(NamedTuple):
     """Samples of a step of the load: from the start of the constant load before it to the end of
-    that after it, the last one before the step and the first one after it."""
+    that after it, the last one before the step and the first one after it; and both loads [N]."""
 
     start: int
     before: int
     after: int
     end: int
+    load_before: float
+    load_after: float
 
 
 def load_step_rows(experiment: Experiment, number: int) -> list[dict[str, Any]]:
@@ -183,20 +184,20 @@ def load_step_rows(experiment: Experiment, number: int) -> list[dict[str, Any]]:
     just after it is L' (mu - alpha ln(L'/L)) (M. Linker and J. Dieterich, Journal of Geophysical
     Research 97 (1992) 4923).
     """
-    if experiment.normal_force is None:
-        return []
-    load = experiment.normal_force.mean(axis=0)
     return [
-        _row(experiment, number, stage, load, step)
+        _row(experiment, number, stage, step)
         for stage in experiment.stages
         if stage.is_steady
-        for step in _steps(load, experiment.samples(stage))
+        for step in load_steps(experiment, stage)
     ]
 
 
-def _steps(load: Array, samples: slice) -> list[_Step]:
-    """Steps of the load between times of constant load."""
-    inside = load[samples]
+def load_steps(experiment: Experiment, stage: Stage) -> list[LoadStep]:
+    """Steps of the normal load in a stage between times of constant load."""
+    if experiment.normal_force is None:
+        return []
+    samples = experiment.samples(stage)
+    inside = experiment.normal_force[:, samples].mean(axis=0)
     if inside.size < 2 * MIN_SAMPLES or not np.isfinite(inside).all():
         return []
     change = np.abs(np.diff(inside))
@@ -215,16 +216,14 @@ def _steps(load: Array, samples: slice) -> list[_Step]:
         size = abs(np.median(levels[1]) - np.median(levels[0]))
         is_constant = all(np.ptp(one) < 2 * MAX_DEVIATION * size for one in levels)
         if min(one.size for one in levels) >= MIN_SAMPLES and is_constant:
-            found.append(_Step(*(samples.start + one for one in (start, before, after, end))))
+            places = (samples.start + one for one in (start, before, after, end))
+            found.append(LoadStep(*places, *map(float, map(np.median, levels))))
     return found
 
 
-def _row(
-    experiment: Experiment, number: int, stage: Stage, load: Array, step: _Step
-) -> dict[str, Any]:
+def _row(experiment: Experiment, number: int, stage: Stage, step: LoadStep) -> dict[str, Any]:
     forces = stage.direction * experiment.force
-    first, last = load[step.start : step.before + 1], load[step.after : step.end + 1]
-    loads = float(np.median(first)), float(np.median(last))
+    loads = step.load_before, step.load_after
     row = empty_row(LOAD_STEPS, number, stage) | {
         "load_step_time": float(experiment.time[step.before]),
         "normal_force_before": loads[0],
@@ -264,7 +263,7 @@ def _row(
 def _fill_distances(
     experiment: Experiment,
     stage: Stage,
-    step: _Step,
+    step: LoadStep,
     start: float,
     steady: float,
     row: dict[str, Any],

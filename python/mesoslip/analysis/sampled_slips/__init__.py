@@ -27,11 +27,7 @@ two more criteria that only a simulation has: breaks of contacts, and the veloci
 """
 
 from mesoslip.analysis.sampled_slips.choice import SlipCounts
-from mesoslip.analysis.sampled_slips.find import (
-    FoundSlips,
-    estimated_period,
-    fall_period,
-    find_slips,
-)
+from mesoslip.analysis.sampled_slips.find import FoundSlips, estimated_period, find_slips
+from mesoslip.analysis.sampled_slips.levels import Parts
 
-__all__ = ["FoundSlips", "SlipCounts", "estimated_period", "fall_period", "find_slips"]
+__all__ = ["FoundSlips", "Parts", "SlipCounts", "estimated_period", "find_slips"]

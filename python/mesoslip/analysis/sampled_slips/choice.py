@@ -72,8 +72,18 @@ class Choice(NamedTuple):
 
 def chosen(every: Iterable[Level]) -> Choice:
     """The smallest minimum fall at which slips stand out, of the median with the longest plateau of
-    those that find about as many."""
-    return max((_at(level) for level in every), key=_persistence)
+    those that find about as many; on the plateau, the one from which their number is constant over
+    the widest range."""
+    best = max((_at(level) for level in every), key=_persistence)
+    if best.counts.plateau is None:
+        return best
+    first, last = best.counts.plateau
+    inside = (best.counts.threshold >= first) & (best.counts.threshold <= last)
+    changes = np.diff(best.counts.count[inside], prepend=-1, append=-1)
+    starts = np.flatnonzero(changes)
+    min_fall = float(best.counts.threshold[inside][starts[np.argmax(np.diff(starts))]])
+    tops, bottoms = best.level.slips(min_fall)
+    return best._replace(min_fall=min_fall, tops=tops, bottoms=bottoms)
 
 
 def _persistence(choice: Choice) -> float:

@@ -12,14 +12,14 @@ import numpy as np
 from mesoslip.analysis.alternating_extremes import Samples
 from mesoslip.analysis.noise import TraceNoise, estimate_noise
 from mesoslip.analysis.sampled_slips.choice import SlipCounts, chosen
-from mesoslip.analysis.sampled_slips.levels import Level, levels
+from mesoslip.analysis.sampled_slips.levels import WHOLE, Level, Parts, levels
 from mesoslip.analysis.sampled_slips.windows import Windows, lines_through, parabolas_through
 from mesoslip.array_types import Array
 
 # Fraction of the depth of a fall at either end that is excluded from its duration.
 MARGIN = 0.1
-# A fall within so many samples to so many standard deviations of the noise above its minimum ends
-# there, not at the minimum.
+# A fall within so many samples, from and to so many standard deviations of the noise at its level
+# and its minimum, ends there, not at the minimum.
 SUDDEN, NEAR = 2, 3.0
 
 
@@ -102,11 +102,13 @@ def ends_of(
     # After a fall that is faster than the sampling, noise determines which sample is the minimum.
     bottoms = bottoms.copy()
     for number in np.flatnonzero(bottoms - starts > SUDDEN).tolist():
-        low = force[bottoms[number]]
-        part = force[starts[number] + 1 :][:SUDDEN]
-        reached = part <= min(low + NEAR * noise, (level[number] + low) / 2)
-        if reached.any():
-            bottoms[number] = starts[number] + 1 + int(np.argmax(reached))
+        fall = force[starts[number] : bottoms[number] + 1]
+        at = int(np.argmax(fall[:-SUDDEN] - fall[SUDDEN:]))
+        high, low = level[number], fall[-1]
+        near = min(NEAR * noise, (high - low) / 4)
+        reached = fall[at + 1 :][:SUDDEN] <= low + near
+        if reached.any() and fall[at] >= high - near:
+            bottoms[number] = starts[number] + at + 1 + int(np.argmax(reached))
     near = np.maximum(1, half // 8)
     first = np.maximum(starts, bottoms - near)
     size = np.minimum(bottoms + near + 1, force.size) - first
@@ -171,6 +173,7 @@ def find_slips(
     direction: float = 1.0,
     min_fall: float | None = None,
     loading_rate: float | None = None,
+    put_together: Parts = WHOLE,
 ) -> FoundSlips:
     """Find the slips in a trace of increasing times [s] and finite forces [N], or coefficients.
 
@@ -179,7 +182,7 @@ def find_slips(
     (M/K)^1/2, is by default twice the duration of deep falls [s]. The minimum fall follows from the
     trace by default; if it is given, every fall above it counts but for rebounds. The rate at which
     the force of a slider at rest grows is that of the rises of the trace [N/s]. The direction is
-    the sign of the drive's velocity.
+    the sign of the drive's velocity. Of parts that were put together each is searched.
     """
     force = direction * np.asarray(force, dtype=float)
     if len(force) < 4:
@@ -193,7 +196,15 @@ def find_slips(
         cleaned = force
     del force
     sigma = noise.total_deviation if isinstance(noise, TraceNoise) else noise
-    every = partial(levels, time, cleaned, noise, period=period, loading_rate=loading_rate)
+    every = partial(
+        levels,
+        time,
+        cleaned,
+        noise,
+        period=period,
+        loading_rate=loading_rate,
+        put_together=put_together,
+    )
     choice = chosen(every())
     level, tops, bottoms, counts = choice.level, choice.tops, choice.bottoms, choice.counts
     if min_fall is None:

@@ -7,6 +7,7 @@ from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -102,6 +103,18 @@ MIN_RATIO = 0.5
 SLOPE_SAMPLES, SLOPE_WIDTHS = 8, 2
 
 
+class Parts(NamedTuple):
+    """Parts of a trace that were put one after the other: no fall extends over two of them."""
+
+    first: Samples
+    """First sample of each part."""
+    are_late: bool = False
+    """Whether they may end after a reversal, where the force does not rise again after a fall."""
+
+
+WHOLE = Parts(np.zeros(1, dtype=int))
+
+
 @dataclass
 class Side:
     """The falls of a trace, or of its mirror image in the line of loading."""
@@ -112,6 +125,7 @@ class Side:
     """Rate of the force while the slider is at rest, if known [N/s]."""
     period: float | None
     """Period of the setup, if given [s]."""
+    parts: Parts
     floor: float
     min_size: float
     """Minimum fall for which extremes are asked for."""
@@ -158,8 +172,18 @@ class Side:
             return tops, bottoms, np.empty(0)
         force = self.force
         lows = np.concatenate([[np.argmin(force[: tops[0] + 1])], bottoms[:-1]])
-        if tops[0] == 0:
-            tops, bottoms, lows = tops[1:], bottoms[1:], lows[1:]
+        # A fall, and the rise before it, begin and end within a part.
+        part = np.searchsorted(self.parts.first, tops, side="right")
+        after = np.append(self.parts.first, force.size)[part]
+        lows = np.maximum(lows, self.parts.first[part - 1])
+        kept = (force[lows] < force[tops]) & (bottoms < after)
+        if self.parts.are_late:
+            last = np.flatnonzero(kept & (np.append(tops[1:], force.size) >= after))
+            kept[last] = [
+                force[bottoms[one] : after[one]].max() > force[bottoms[one]] + self.floor / 2
+                for one in last.tolist()
+            ]
+        tops, bottoms, lows = tops[kept], bottoms[kept], lows[kept]
         self._ratios.add(tops, bottoms, lows)
         depth = force[tops] - force[bottoms]
         return tops, bottoms, depth - MIN_FALL_RATIO * self._rebounds(lows, tops, bottoms)
@@ -169,8 +193,7 @@ class Side:
         """Rate of the deepest fall [N/s]."""
         if self.original is not None:
             return self.original._deepest_rate
-        tops, bottoms = self.extremes.falls(self.floor)
-        tops, bottoms = tops[tops > 0], bottoms[tops > 0]
+        tops, bottoms = self.exceeding(self.floor, with_rebounds=True)
         if tops.size == 0:
             return 0.0
         drop = self.force[tops] - self.force[bottoms]
@@ -294,6 +317,7 @@ def levels(
     period: float | None = None,
     loading_rate: float | None = None,
     min_fall: float = math.inf,
+    put_together: Parts = WHOLE,
 ) -> Iterator[Level]:
     """The trace after running medians, from narrow to wide, until noise is negligible; long ones
     are held one at a time."""
@@ -321,7 +345,8 @@ def levels(
         )
         # The rate of loading is that between falls of half the typical size.
         min_size = min(floor / 2, min_fall)
-        trace = Side(time, filtered, loading_rate, period, floor, min_size, tuple(rising))
+        narrower = tuple(rising)
+        trace = Side(time, filtered, loading_rate, period, put_together, floor, min_size, narrower)
         yield Level(parts, width * interval, floor, trace, slope)
         if math.isfinite(trace.rising):
             rising.append(trace.rising)

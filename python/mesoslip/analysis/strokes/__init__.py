@@ -10,6 +10,7 @@ from mesoslip.analysis.strokes.revolutions import (
     has_rotation,
 )
 from mesoslip.analysis.strokes.segments import (
+    FORCE,
     Piece,
     back_and_forth,
     monotone_pieces,
@@ -21,6 +22,7 @@ from mesoslip.analysis.strokes.sliding import Sliding, sliding_of
 from mesoslip.analysis.strokes.slips import find_slips_between_reversals
 
 __all__ = [
+    "FORCE",
     "FrictionMap",
     "Piece",
     "Sliding",

@@ -46,7 +46,7 @@ def revolutions_of(
     The period [s] may be given.
     """
     record = record_in(tree, realization, (), "")
-    angle, source = _angle(tree, realization, record.time, period)
+    angle, source = _angle(tree, realization, record.time, period, name)
     turned = float(angle[-1] - angle[0])
     per_revolution = record.time.size / turned if turned > 0 else 0.0
     each = max(1, math.ceil(MIN_SAMPLES / max(per_revolution, 1e-300)))
@@ -121,14 +121,22 @@ def _peak(correlation: Array, near: int, reach: int) -> float:
     return at + (0.5 * (left - right) / bend if bend < 0 else 0.0)
 
 
-def _angle(tree: Tree, realization: int, time: Array, period: float | None) -> tuple[Array, str]:
+def _angle(
+    tree: Tree, realization: int, time: Array, period: float | None, name: str
+) -> tuple[Array, str]:
     """Revolutions at the samples, which do not decrease, and the quantity they are from."""
     if period is not None:
+        interval = float(time[-1] - time[0]) / (time.size - 1)
+        if period < 2 * interval:
+            raise FileError(
+                f"{name}: a period of {with_unit(period, 's')} is shorter than two samples, "
+                f"{with_unit(2 * interval, 's')}"
+            )
         return (time - time[0]) / period, "period"
     root = tree.to_dataset()
-    name = COUNT if COUNT in root else SPEED
-    values = root[name].values[realization][: time.size].astype(float)
-    if name == COUNT:
+    column = COUNT if COUNT in root else SPEED
+    values = root[column].values[realization][: time.size].astype(float)
+    if column == COUNT:
         return angle_of(time, values, None), "column of revolutions"
     return angle_of(time, None, values), "speed of rotation"
 

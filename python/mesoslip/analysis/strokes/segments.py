@@ -37,10 +37,9 @@ MIN_END = 0.01
 MIN_BACK = 0.05
 # Maximum distance from an extreme at which the displacement rests, over the swing.
 REST = 0.002
-# The force without a displacement: quantiles that are its levels, minimum ratio of the smaller to
-# the larger, negative for levels of one sign, and part of the distance from their middle to them
-# that a change of level exceeds.
-LEVELS, MIN_RATIO, BEYOND = (0.1, 0.9), -0.2, 0.5
+# The force without a displacement: quantiles that are its levels, and part of the distance from
+# their middle to them that a change of level exceeds.
+LEVELS, BEYOND = (0.1, 0.9), 0.5
 # Limits of the time in which the force leaves its level, over that at its rate after it.
 TIMES = (2.2, 0.5)
 # Noise over the distance to the levels that smoothing leaves, and maximum share of a period over
@@ -163,16 +162,16 @@ def pieces_of_force(
     """Pieces guessed from the sign of a force; None if it does not look like friction in strokes.
 
     The force has two levels, at which it is most of the time, and is mirrored in their middle after
-    half a period. Slips fall faster than the force rises. The levels have opposite signs; one may
-    be about zero, as with partial slip and an offset, and both may have any sign if strokes are
-    given.
+    half a period. Slips fall faster than the force rises. The levels differ by more than their
+    mean: they have opposite signs, or one is small, as with partial slip and an offset. Both may
+    have any sign if strokes are given.
     """
     if force.size < 4 * MIN_CHANGES:
         return None
     low, high = (float(one) for one in np.quantile(force, LEVELS))
-    if not (is_given or min(-low, high) >= MIN_RATIO * max(-low, high)):
-        return None
     middle, half = (low + high) / 2, (high - low) / 2
+    if not is_given and 2 * half < abs(middle):
+        return None
     level = noise_level(force)
     if 2 * half * (1 - BEYOND) < _range_of_noise(force, level) / 2:
         return None

@@ -63,8 +63,8 @@ class Sliding:
         return max(float(np.median(rates)), 0.0) * since if rates else since
 
     def unfolded(self) -> Array:
-        """The force without trend and without steps from part to part."""
-        force = self.force - self.trend
+        """The force without steps from part to part."""
+        force = self.force.copy()
         level = float(force[0]) if force.size else 0.0
         for one in self.parts:
             force[one] += level - force[one.start]

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from mesoslip.analysis.noise import TraceNoise, estimate_noise
-from mesoslip.analysis.sampled_slips import FoundSlips, fall_period, find_slips
+from mesoslip.analysis.sampled_slips import FoundSlips, Parts, find_slips
 from mesoslip.analysis.strokes.segments import Piece
 from mesoslip.analysis.strokes.sliding import sliding_of
 from mesoslip.array_types import Array
@@ -30,12 +30,13 @@ def find_slips_between_reversals(
     force: Array,
     *,
     noise: float | TraceNoise | None = None,
+    are_guessed: bool = False,
     **options: Any,
 ) -> FoundSlips:
     """The slips of a record within its monotone pieces; see `find_slips`.
 
-    The pieces are those of `monotone_pieces` or `pieces_of_force`; None stands for a record in one
-    direction. Forces of slips have the sign of the record.
+    The pieces are those of `monotone_pieces`, or guessed, those of `pieces_of_force`; None stands
+    for a record in one direction. Forces of slips have the sign of the record.
     """
     if pieces is None:
         return find_slips(time, force, noise=noise, **options)
@@ -51,20 +52,16 @@ def find_slips_between_reversals(
     samples, piece, sign, unfolded = (
         sliding.samples, sliding.piece, sliding.sign, sliding.unfolded()
     )  # fmt: skip
-    found = find_slips(time[samples], unfolded, noise=noise, **options)
+    parts = Parts(np.flatnonzero(np.diff(piece, prepend=-1)), are_guessed)
+    found = find_slips(time[samples], unfolded, noise=noise, put_together=parts, **options)
     end = np.array([one.after for one in pieces])[piece[found.first]] - END
     # A fall up to the end of a piece, or nearly so, is that of a reversal that was found late.
     end -= (samples[found.last] - samples[found.first]) // 2
     kept = (piece[found.first] == piece[found.last]) & (samples[found.last] < end)
     first, last = found.first[kept], found.last[kept]
     shift = sliding.force - unfolded
-    period = found.period
-    if options.get("period") is None and not kept.all():
-        # Falls over a reversal are none of the setup.
-        period = fall_period(time[samples], unfolded, found.first[kept], found.last[kept])
     return replace(
         found,
-        period=period,
         start_time=found.start_time[kept],
         end_time=found.end_time[kept],
         force_before=sign[first] * (found.force_before[kept] + shift[first]),

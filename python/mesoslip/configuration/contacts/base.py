@@ -19,6 +19,9 @@ from mesoslip.configuration.table import Complaint, Complaints, Table
 
 Array = NDArray[Any]
 
+# Time that a contact takes which touches or separates as the load changes [s].
+LOAD_CHANGE_SECONDS = 1e-7
+
 # Keys that every kind answers, by `common_parameters` or in its own room. Any other key or table
 # that is given belongs to the kinds that have it as a feature, and is refused by all others.
 COMMON_KEYS = frozenset(
@@ -118,6 +121,14 @@ class ContactKind(ABC):
     def site_count(self, contacts: Contacts) -> int:
         """Number of sites of contacts: that of contacts at the maximum of the load."""
         return self.load.site_count(contacts.count)
+
+    def load_changes(self, config: Setting) -> float:
+        """How often contacts touch or separate because the load changes in a realization; 0 where
+        they are not counted one by one."""
+        if not self.is_discrete:
+            return 0.0
+        path = self.load.path_length(config.expected_duration)
+        return config.contacts.count * path / self.load.normal_force
 
     def dimensions(self, contacts: Contacts) -> dict[str, int]:
         """Dimensions of the contacts in outputs, and their lengths."""

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import lzma
+import math
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import IO, Any
 
+import numpy as np
+
+from mesoslip.array_types import Array
 from mesoslip.errors import FileError
 from mesoslip.measured.reading.binary import binary_blocks
 from mesoslip.measured.reading.file import READERS, read_file
@@ -20,7 +24,7 @@ from mesoslip.measured.reading.source import (
     check_file,
     text_of,
 )
-from mesoslip.measured.reading.stamps import Order
+from mesoslip.measured.reading.stamps import Order, past_midnight
 from mesoslip.measured.reading.table import BadCell, Table
 from mesoslip.measured.reading.text import read_text
 
@@ -56,6 +60,7 @@ def blocks_of(
         return
     above = b""
     lines = 0
+    latest: dict[int, float] = {}
     unpacked: Any = COMPRESSIONS[name][1] if name else nullcontext
     try:
         with path.open("rb") as file, unpacked(file) as stream:
@@ -68,10 +73,15 @@ def blocks_of(
                 # Blocks below are read as those above.
                 dates = table.dates
                 if above:
-                    table = _below(table, lines - above.count(NEWLINE))
+                    table = _below(table, lines - above.count(NEWLINE), latest)
                 else:
                     above = b"".join(text.splitlines(keepends=True)[: int(table.lines[0])])
                 lines += text.count(NEWLINE)
+                latest = {
+                    column: _latest(table.values[column])
+                    for column, clock in table.clocks.items()
+                    if clock.chosen is None
+                }
                 yield table
             if os.fstat(file.fileno()).st_size != size:
                 raise FileError(f"{path}: {CHANGED}")
@@ -93,15 +103,27 @@ def _pieces(stream: IO[bytes]) -> Iterator[bytes]:
         yield rest
 
 
-def _below(table: Table, shift: int) -> Table:
-    """A table without its first row, that of the first block, and with the lines of the file."""
+def _latest(values: Array) -> float:
+    """The last known value; NaN if there is none."""
+    known = values[np.isfinite(values)]
+    return float(known[-1]) if known.size else math.nan
+
+
+def _below(table: Table, shift: int, latest: Mapping[int, float]) -> Table:
+    """A table without its first row, that of the first block, and with the lines of the file.
+
+    Clocks without dates continue after their latest times.
+    """
 
     def moved(cells: list[BadCell]) -> list[BadCell]:
         return [one._replace(line=one.line + shift) for one in cells]
 
+    values = table.values[:, 1:]
+    for column, last in latest.items():
+        values[column] = past_midnight(values[column], last)
     return replace(
         table,
-        values=table.values[:, 1:],
+        values=values,
         lines=table.lines[1:] + shift,
         bad={column: moved(cells) for column, cells in table.bad.items()},
         notes=[one for one in table.notes if one.startswith("guess: ")],

@@ -6,11 +6,20 @@ all its dates exist and do not decrease. pandas would decide for each cell by it
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from datetime import date
 from functools import lru_cache
 from typing import Literal, NamedTuple, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mesoslip.array_types import Array
+
+Samples = NDArray[np.int_]
+Characters = NDArray[np.uint8]
 
 Order = Literal["dmy", "mdy", "ymd"]
 """Order of day, month and year in a date of numbers."""
@@ -36,6 +45,9 @@ STAMP_FORM = re.compile(r"(?i)(?=.*(?:yy|hh|jj))[dmyjhst.:/,f -]+")
 # A year of two digits is from 1970 to 2069.
 FIRST_YEAR = 1970
 DAY = 86_400 * 10**9
+# Maximum number of forms of time stamps that are read at once: days, hours and months differ in
+# their digits and letters.
+MAX_FORMS = 100
 
 
 class Chosen(NamedTuple):
@@ -108,43 +120,133 @@ def date_of(cell: str) -> str | None:
     return None if found is None else found["date"] or ""
 
 
+def only_order(written: str) -> Order | None:
+    """The order of a date that has a single one."""
+    orders = [*_days(written)]
+    return orders[0] if len(orders) == 1 else None
+
+
 class Clock:
-    """Time stamps of a column as seconds from the first one. Without dates they pass midnight."""
+    """Time stamps of a column as seconds from the first one; those without dates, within a day."""
 
     def __init__(self, chosen: Chosen | None = None) -> None:
         self.chosen = chosen
         self.first = ""
-        self._start = self._last = self._days = 0
+        self._start = 0, 0
 
     @property
     def start(self) -> float:
-        """The first time stamp [s]."""
-        return self._start / 1e9
+        """The first time stamp [s], from one day for all files, or from midnight without a date."""
+        day, part = self._start
+        return (day * DAY + part) / 1e9
 
     def seconds(self, cell: str) -> float | None:
         """Seconds of a cell; None if it is not a time stamp."""
-        found = STAMP.fullmatch(cell)
-        if found is None:
-            return None
-        written = found["date"]
-        if not written and (found["colon"] == "." or found["second"] is None):
-            return None
-        hour, minute, second = (int(found[one] or 0) for one in ("hour", "minute", "second"))
-        if found["half"] and hour <= 12:
-            hour = hour % 12 + (12 if found["half"] in "Pp" else 0)
-        day: int | None = self._days
-        if written:
-            days = _days(written)
-            chosen = self.chosen or (chosen_order([written]) if days else None)
-            day = None if chosen is None else days.get(chosen.order)
-        if day is None or hour > 23 or minute > 59 or second > 59:
-            return None
-        second += 3600 * hour + 60 * minute
-        now = day * DAY + second * 10**9 + int(f"{found['part'] or 0:0<9}")
-        if not written and self.first and now < self._last - DAY // 2:
-            self._days += 1
-            now += DAY
+        data = np.frombuffer(cell.encode(), np.uint8)
+        found = float(self.read(data, np.array([0]), np.array([data.size]))[0])
+        return None if math.isnan(found) else found
+
+    def read(self, data: Characters, first: Samples, after: Samples) -> Array:
+        """Seconds of the cells ``data[first:after]``; NaN if one is not a time stamp."""
+        found = np.full(first.size, np.nan)
+        for rows, cells in _alike(data, first, after):
+            found[rows] = self._seconds(cells)
+        return found
+
+    def _seconds(self, cells: Characters) -> Array:
+        """Seconds of cells of one form, characters of shape (cells, length)."""
+        form = _form(cells)
+        nothing = np.full(len(cells), np.nan)
+        if form is None or not (form["date"] or (form["colon"] == ":" and form["second"])):
+            return nothing
+
+        def number(name: str) -> Samples:
+            digits = _part(cells, form, name).astype(int) - ord("0")
+            return np.asarray(digits @ 10 ** np.arange(digits.shape[1])[::-1])
+
+        hour, minute = number("hour"), number("minute")
+        second = number("second") if form["second"] else np.zeros_like(hour)
+        if form["half"]:
+            noon = 12 if form["half"] in "Pp" else 0
+            hour = np.where(hour <= 12, hour % 12 + noon, hour)
+        day = self._day(_part(cells, form, "date")) if form["date"] else np.zeros_like(hour)
+        known = (day >= 0) & (hour <= 23) & (minute <= 59) & (second <= 59)
+        part = (3600 * hour + 60 * minute + second) * 10**9
+        if form["part"]:
+            part += number("part") * 10 ** (9 - len(form["part"]))
+        if not known.any():
+            return nothing
         if not self.first:
-            self.first, self._start = cell, now
-        self._last = now
-        return (now - self._start) / 1e9
+            row = int(np.argmax(known))
+            self.first, self._start = cells[row].tobytes().decode(), (int(day[row]), int(part[row]))
+        since = (day - self._start[0]) * DAY + part - self._start[1]
+        return np.where(known, since / 1e9, np.nan)
+
+    def _day(self, dates: Characters) -> Samples:
+        """Numbers of the days of dates; -1 for one that does not exist."""
+        rows, written = _changes(dates)
+        days = []
+        for one in written:
+            found = _days(one)
+            chosen = self.chosen or (chosen_order([one]) if found else None)
+            days.append(-1 if chosen is None else found.get(chosen.order, -1))
+        return np.repeat(days, np.diff(rows, append=len(dates)))
+
+
+def dates_of(data: Characters, first: Samples, after: Samples) -> Iterator[str]:
+    """The dates of the time stamps in the cells ``data[first:after]``, where they change."""
+    found: dict[int, str] = {}
+    for rows, cells in _alike(data, first, after):
+        form = _form(cells)
+        if form is not None and form["date"]:
+            changes, written = _changes(_part(cells, form, "date"))
+            found |= dict(zip(rows[changes].tolist(), written, strict=True))
+    for row in sorted(found):
+        yield found[row]
+
+
+def _alike(
+    data: Characters, first: Samples, after: Samples
+) -> Iterator[tuple[Samples, Characters]]:
+    """Rows of cells of one form, in which the same characters are digits, and their characters,
+    shape (rows, length)."""
+    rows, sizes = np.arange(first.size), after - first
+    for _ in range(MAX_FORMS):
+        if rows.size == 0:
+            return
+        size = sizes[rows[0]]
+        alike = rows[sizes[rows] == size]
+        cells = data[first[alike][:, np.newaxis] + np.arange(size)]
+        is_digit = (cells >= ord("0")) & (cells <= ord("9"))
+        forms = np.where(is_digit, np.uint8(ord("0")), cells)
+        is_same = (forms == forms[0]).all(axis=1)
+        yield alike[is_same], cells[is_same]
+        rows = np.setdiff1d(rows, alike[is_same], assume_unique=True)
+
+
+def _form(cells: Characters) -> re.Match[str] | None:
+    return STAMP.fullmatch(cells[0].tobytes().decode())
+
+
+def _part(cells: Characters, form: re.Match[str], name: str) -> Characters:
+    """The characters of a part of time stamps."""
+    start, end = (len(form.string[:one].encode()) for one in form.span(name))
+    return cells[:, start:end]
+
+
+def _changes(texts: Characters) -> tuple[list[int], list[str]]:
+    """Rows in which a text differs from the one before, with the first, and the texts there."""
+    rows = [0, *(np.flatnonzero((texts[1:] != texts[:-1]).any(axis=1)) + 1).tolist()]
+    return rows, [texts[one].tobytes().decode() for one in rows]
+
+
+def past_midnight(seconds: Array, last: float = math.nan) -> Array:
+    """Seconds that increase over midnight, from those within a day; after a last one, if any."""
+    known = np.isfinite(seconds)
+    within = seconds[known]
+    days = np.cumsum(np.diff(within, prepend=within[:1]) < -DAY / 2e9)
+    if within.size and math.isfinite(last):
+        days += max(0, round((last - within[0]) / (DAY / 1e9)))
+    passed = seconds.copy()
+    passed[known] = np.rint(within * 1e9 + days * DAY) / 1e9
+    return passed

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mesoslip.array_types import Array
-from mesoslip.measured.reading.stamps import Order
+from mesoslip.measured.reading.stamps import Clock, Order
 
 
 class BadCell(NamedTuple):
@@ -41,8 +41,8 @@ class Table:
     """Lines about the file."""
     dates: Order | None = None
     """Order of the dates in its time stamps."""
-    starts: Mapping[int, float] = field(default_factory=dict)
-    """First time stamps of columns whose dates are known [s], from one day for all files."""
+    clocks: Mapping[int, Clock] = field(default_factory=dict)
+    """Those of columns of time stamps."""
 
     @property
     def row(self) -> str:

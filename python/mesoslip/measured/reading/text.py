@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from io import BytesIO
 from itertools import islice
@@ -29,7 +28,10 @@ from mesoslip.measured.reading.stamps import (
     Order,
     chosen_order,
     date_of,
+    dates_of,
+    only_order,
     order_of,
+    past_midnight,
 )
 from mesoslip.measured.reading.table import BadCell, Table, listed
 
@@ -108,7 +110,7 @@ def read_text(
         True,
         [*_layout_notes(layout), *body.notes()],
         body.order_of_dates,
-        {at: one.start for at, one in body.clocks.items() if one.chosen and not one.chosen.is_open},
+        body.clocks,
     )
 
 
@@ -142,6 +144,10 @@ class _Body:
     above: set[str] = field(default_factory=set)
     clocks: dict[int, Clock] = field(default_factory=dict)
     """Columns of time stamps."""
+    stamps: dict[int, Array] = field(default_factory=dict)
+    """Their seconds in the lines of a block; NaN where they are not known."""
+    top: int = 0
+    """Index of the first line of the block."""
 
     def read(self) -> tuple[Array, Numbers]:
         """Numbers, shape (columns, rows), and the line of each row."""
@@ -153,13 +159,11 @@ class _Body:
         values = np.full((layout.count, count), np.nan)
         is_row = np.zeros(count, dtype=bool)
         signs = np.full(count, NO_SIGNS, dtype=np.uint16)
-        at = 0
-        while at < count:
-            # A block ends with a line.
-            place = self.lines.start(layout.first + at) + BLOCK
-            to = max(at + 1, int(np.searchsorted(self.lines.ends, place)) - layout.first)
-            self._read_block(slice(at, to), values, is_row, signs)
-            at = to
+        for block in self._blocks():
+            self._read_block(block, values, is_row, signs)
+        for column, clock in self.clocks.items():
+            if clock.chosen is None:
+                values[column] = past_midnight(values[column])
         self._find_odd(signs)
         self._check_short(int(is_row.sum()))
         self._cut_off(is_row)
@@ -167,6 +171,25 @@ class _Body:
         if kept.size and kept[-1] == kept.size - 1:
             return values[:, : kept.size], kept + layout.first + 1
         return values[:, kept], kept + layout.first + 1
+
+    def _blocks(self) -> Iterator[slice]:
+        """Blocks of lines below the header; each ends with a line."""
+        first, at = self.layout.first, 0
+        while at < len(self.lines) - first:
+            place = self.lines.start(first + at) + BLOCK
+            to = max(at + 1, int(np.searchsorted(self.lines.ends, place)) - first)
+            yield slice(at, to)
+            at = to
+
+    def _bytes(self, block: slice) -> tuple[NDArray[np.uint8], Numbers, Numbers]:
+        """The bytes of a block, and where each of its lines starts and ends in them."""
+        first = self.layout.first + block.start
+        start = self.lines.start(first)
+        ends = self.lines.ends[first : self.layout.first + block.stop] - start
+        data = self.lines.bytes[start : start + ends[-1] + 1]
+        if len(data) == ends[-1]:
+            data = np.append(data, np.uint8(NEWLINE))
+        return data, np.concatenate([[0], ends[:-1] + 1]), ends
 
     def _find_clocks(self) -> dict[int, Clock]:
         """Columns of time stamps, by the first row."""
@@ -180,9 +203,9 @@ class _Body:
                 break
             if any(is_number(cell, layout.decimal) for cell in cells):
                 return {
-                    column: Clock(self._order_of_dates(column) if date_of(cell) else None)
+                    column: Clock(self._order_of_dates(column, date) if date else None)
                     for column, cell in enumerate(cells)
-                    if Clock().seconds(cell) is not None
+                    if (date := date_of(cell)) is not None and Clock().seconds(cell) is not None
                 }
         return {}
 
@@ -192,18 +215,20 @@ class _Body:
         known = (one.chosen for one in self.clocks.values() if one.chosen is not None)
         return next((one.order for one in known if not one.is_open), None)
 
-    def _order_of_dates(self, column: int) -> Chosen:
-        """The order of the dates of a column: as given, by the line of units, or by all dates."""
+    def _order_of_dates(self, column: int, first: str) -> Chosen:
+        """The order of the dates of a column, of which the first is known: as given, by the line of
+        units, or by all dates."""
         layout = self.layout
         given = self.dates or (order_of(layout.units[column]) if layout.units else None)
+        given = given or only_order(first)
         if given is not None:
             return Chosen(given)
-        dates: dict[str, None] = {}
-        for line in islice(self.lines, layout.first, None):
-            with suppress(ValueError, IndexError):
-                date = date_of(split(line, layout.delimiter)[column])
-                if date:
-                    dates[date] = None
+        dates: dict[str, None] = {first: None}
+        for block in self._blocks():
+            data, starts, ends = self._bytes(block)
+            _, begins, stops = self._spans(data, starts, ends)
+            spans = _inner(data, begins[:, column], stops[:, column])
+            dates |= dict.fromkeys(dates_of(data, *spans))
         return chosen_order([*dates])
 
     def _read_block(
@@ -211,17 +236,18 @@ class _Body:
     ) -> None:
         """Read some lines: their numbers, which of them are rows, and their decimal signs."""
         first = self.layout.first + block.start
-        start = self.lines.start(first)
-        ends = self.lines.ends[first : self.layout.first + block.stop] - start
-        data = self.lines.bytes[start : start + ends[-1] + 1]
-        if len(data) == ends[-1]:
-            data = np.append(data, np.uint8(NEWLINE))
-        starts = np.concatenate([[0], ends[:-1] + 1])
-        is_regular = self._regular(data, starts, ends)
+        self.top = first
+        data, starts, ends = self._bytes(block)
+        is_regular = np.ones(len(starts), dtype=bool)
+        if self.clocks:
+            data, is_regular = self._without_stamps(data, starts, ends)
+        is_regular &= self._regular(data, starts, ends)
         points = _counts(data == ord(self.layout.decimal), ends)
         signs[block][is_regular] = np.minimum(points[is_regular], NO_SIGNS - 1)
         if is_regular.any():
             values[:, block][:, is_regular] = self._fast(data, starts, ends, is_regular, first)
+            for column, seconds in self.stamps.items():
+                values[column, block][is_regular] = seconds[is_regular]
         is_row[block] = is_regular
         for at in np.flatnonzero(~is_regular):
             row = self._cells(int(at) + first)
@@ -231,8 +257,6 @@ class _Body:
     def _regular(self, data: NDArray[np.uint8], starts: Numbers, ends: Numbers) -> NDArray[np.bool]:
         """Whether lines have the usual number of cells and only characters of numbers."""
         layout = self.layout
-        if self.clocks:
-            return np.zeros(len(starts), dtype=bool)
         allowed = np.zeros(256, dtype=bool)
         comma = layout.decimal if layout.delimiter != "," or layout.decimal != "," else "."
         allowed[list(b"0123456789+-eE \n" + (comma + layout.delimiter).encode())] = True
@@ -242,7 +266,7 @@ class _Body:
         has_strange = np.zeros(len(starts), dtype=bool)
         has_strange[np.searchsorted(ends, strange)] = True
         if layout.delimiter == " ":
-            is_blank = (data == ord(" ")) | (data == ord("\t")) | (data == NEWLINE)
+            is_blank = _is_blank(data)
             begins = ~is_blank
             begins[1:] &= is_blank[:-1]
             count = _counts(begins, ends)
@@ -252,6 +276,47 @@ class _Body:
             count[ends == starts] = 0
         regular: NDArray[np.bool] = (count == layout.count) & ~has_strange
         return regular
+
+    def _without_stamps(
+        self, data: NDArray[np.uint8], starts: Numbers, ends: Numbers
+    ) -> tuple[NDArray[np.uint8], NDArray[np.bool]]:
+        """A block with zeros for its time stamps, and the lines in which all of them are known, or
+        missing, and there are other digits."""
+        lines, begins, stops = self._spans(data, starts, ends)
+        is_known = np.zeros(len(starts), dtype=bool)
+        is_known[lines] = True
+        is_stamp = np.zeros(len(data) + 1, dtype=np.int8)
+        for column, clock in self.clocks.items():
+            first, after = _inner(data, begins[:, column], stops[:, column])
+            found = np.full(len(starts), np.nan)
+            found[lines] = clock.read(data, first, after)
+            self.stamps[column] = found
+            known = np.isfinite(found[lines])
+            is_known[lines[~known & (first < after)]] = False
+            is_stamp[begins[known, column]] += 1
+            is_stamp[stops[known, column]] -= 1
+        is_stamp = np.cumsum(is_stamp[:-1], dtype=np.int8)
+        digits = (data >= ord("0")) & (data <= ord("9")) & (is_stamp == 0)
+        is_known &= _counts(digits, ends) > 0
+        return np.where(is_stamp > 0, np.uint8(ord("0")), data), is_known
+
+    def _spans(
+        self, data: NDArray[np.uint8], starts: Numbers, ends: Numbers
+    ) -> tuple[Numbers, Numbers, Numbers]:
+        """Lines with the usual number of cells, and where each cell begins and ends, shape (lines,
+        columns)."""
+        layout = self.layout
+        if layout.delimiter == " ":
+            is_blank = _is_blank(data)
+            before = np.append(True, is_blank[:-1])
+            begins, stops = np.flatnonzero(~is_blank & before), np.flatnonzero(is_blank & ~before)
+        else:
+            cuts = np.flatnonzero(data == ord(layout.delimiter))
+            begins, stops = np.sort(np.append(starts, cuts + 1)), np.sort(np.append(ends, cuts))
+        last = np.searchsorted(begins, ends, side="right")
+        lines = np.flatnonzero(np.diff(last, prepend=0) == layout.count)
+        cells = last[lines, np.newaxis] + np.arange(-layout.count, 0)
+        return lines, begins[cells], stops[cells]
 
     def _find_odd(self, signs: NDArray[np.uint16]) -> None:
         """Find rare rows with fewer decimal signs than all others."""
@@ -343,9 +408,12 @@ class _Body:
         """The number of a cell; NaN without one."""
         decimal = self.layout.decimal
         clock = self.clocks.get(column)
-        seconds = None if clock is None else clock.seconds(cell)
-        if seconds is not None:
-            return seconds
+        if clock is not None:
+            seconds = self.stamps[column][line - 1 - self.top]
+            if math.isnan(seconds):
+                seconds = clock.seconds(cell)
+            if seconds is not None:
+                return float(seconds)
         if clock is None and is_number(cell, decimal):
             value = float(cell.replace(",", "."))
             if math.isfinite(value):
@@ -430,6 +498,24 @@ class _Body:
         if self.cut is not None:
             notes.append(f"line {self.cut}: the last row seems to be cut short, left out")
         return notes
+
+
+def _is_blank(data: NDArray[np.uint8]) -> NDArray[np.bool]:
+    """Which bytes are between cells, or lines, of a table with blanks between its cells."""
+    is_blank: NDArray[np.bool] = (data == ord(" ")) | (data == ord("\t")) | (data == NEWLINE)
+    return is_blank
+
+
+def _inner(data: NDArray[np.uint8], first: Numbers, after: Numbers) -> tuple[Numbers, Numbers]:
+    """Where cells begin and end without the blanks and the quotes around them."""
+
+    is_around = (data == ord(" ")) | (data == ord('"'))
+    first, after = first.copy(), after.copy()
+    while (outside := (first < after) & is_around[first]).any():
+        first[outside] += 1
+    while (outside := (first < after) & is_around[after - 1]).any():
+        after[outside] -= 1
+    return first, after
 
 
 def _counts(is_there: NDArray[np.bool], ends: Numbers) -> Numbers:

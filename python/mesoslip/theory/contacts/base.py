@@ -115,11 +115,14 @@ class ContactTheory:
 
     def _refuse(self, missing: str) -> NoReturn:
         """Raise an error that names the key without a theory."""
-        features = self.config.given_contact_keys - KNOWN_KEYS
-        raise ConfigError(
-            [Problem("", key, f"has {missing}: leave it out") for key in sorted(features)]
-            or [Problem("", "contacts", f"have {missing}")]
-        )
+        key, *others = sorted(self.config.given_contact_keys - KNOWN_KEYS) or [""]
+        if not key:
+            message = f"have {missing}"
+        elif others:
+            message = f"has {missing} together with {' and '.join(others)}: leave one of them out"
+        else:
+            message = f"has {missing}: leave it out"
+        raise ConfigError([Problem("", key or "contacts", message)])
 
     @property
     def K_star_estimate(self) -> float:  # noqa: N802

@@ -181,7 +181,7 @@ contains
    end function turn_stretch
 
    !> Let contacts stay in their clocks as long as their rates are negligible in both. A slider that
-   !> rings moves most of them to and fro in this range.
+   !> rings moves most of them back and forth in this range.
    pure subroutine delay_turns(self)
       class(hazard_type), intent(inout) :: self
 

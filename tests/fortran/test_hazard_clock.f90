@@ -71,6 +71,9 @@ contains
       hazard = hazard_type(rate=1.0e4_wp, slope=50.0_wp)
       call hazard%delay_turns()
       call check(hazard%turn_stretch(1.0_wp) > 0.2_wp, "at low temperature they turn late")
+      hazard%rate = 1.0e-20_wp
+      call hazard%delay_turns()
+      call check(hazard%turn_stretch(1.0_wp) < 0.95_wp, "at any rate they turn before they break")
    end subroutine contacts_turn_before_their_rates_count
 
    !> A step with the largest exponents of a rule, with and without an end, against ten points.

@@ -291,8 +291,8 @@ contains
       end if
    end subroutine scan
 
-   !> Append the contacts with keys below a horizon to a list, without a branch: each is written, and
-   !> counted if it is below.
+   !> Append the contacts with keys below a horizon to a list. Without a branch: each is written,
+   !> and counted if it is below.
    pure subroutine collect(key, horizon, near_key, near_contact, last)
       real(wp), intent(in), contiguous :: key(:)
       real(wp), intent(in) :: horizon

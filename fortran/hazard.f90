@@ -22,8 +22,9 @@ module mesoslip_hazard
    !> reading lose digits accordingly
    real(wp), parameter :: max_fall = 8.0_wp
 
-   !> Rate of breaking that is negligible [1/s]: one in 300 000 years
-   real(wp), parameter :: negligible_rate = 1.0e-13_wp
+   !> Rate of breaking that is negligible [1/s], one in 300 000 years, and the minimum of the rate
+   !> at the threshold over it: for slower contacts less is negligible
+   real(wp), parameter :: negligible_rate = 1.0e-13_wp, min_ratio = 1.0e20_wp
    !> Stretch over the mean breaking stretch at which the sign of a force changes: negligible, but
    !> larger than rounding errors; and maximum stretch at which it may count as changed, over that
    !> at breaking
@@ -48,8 +49,8 @@ module mesoslip_hazard
          & max_exponent(clocks) = 0.0_wp
       !> Reading at which the next contact breaks [s]
       real(wp) :: next(clocks) = never
-      !> Stretch of a contact by which it stays in its clock after its force has changed its sign:
-      !> minimum [m], and how far that is from breaking otherwise, where its rate is negligible [m]
+      !> Stretch against its clock at which a contact moves to the other one: its minimum [m], and
+      !> the distance from there to breaking, where rates are negligible [m]
       real(wp) :: min_turn = 0.0_wp, quiet_distance = huge(1.0_wp)
       !> For forces that change their sign: maximum distance from there to where they are changed
       !> [m], minimum stretch at the threshold of such contacts [m], and maximum duration of the
@@ -185,7 +186,7 @@ contains
    pure subroutine delay_turns(self)
       class(hazard_type), intent(inout) :: self
 
-      self%quiet_distance = log(max(1.0_wp, self%rate / negligible_rate)) / self%slope
+      self%quiet_distance = log(max(min_ratio, self%rate / negligible_rate)) / self%slope
    end subroutine delay_turns
 
    !> Set where and how long it makes no difference when a force changes its sign: the contact does

@@ -104,14 +104,14 @@ module mesoslip_schedule
       !> For each entry that of the same contact in the other list, or 0, and whether it is gone
       integer :: break_twin(max_events) = 0, clock_twin(max_events) = 0
       logical :: break_gone(max_events) = .false., clock_gone(max_events) = .false.
-      !> For each entry by coordinate whether the contact does not break there, but its force gets
-      !> the sign of the motion; its stretch at breaking [m], its remaining deviate, and its reading
+      !> For each entry by coordinate whether the contact does not break there, but moves to the
+      !> clock of the motion; its stretch at breaking [m], its remaining deviate, and its reading
       !> [s], by the other clock before that and by this one after it
       logical :: break_turns(max_events) = .false.
       real(wp) :: turn_limit(max_events) = 0.0_wp, turn_left(max_events) = 0.0_wp, &
          & turn_key(max_events) = 0.0_wp
-      !> Past changes of sign; contacts of the other clock, and the entry of the first of them to
-      !> break, 0 if it is not listed
+      !> Past moves to that clock; contacts of the other clock, and the entry of the first of them
+      !> to break, 0 if it is not listed
       integer :: turned = 0, others = 0, other_first = 0
       !> All past breaks, and the entry of each, negative in the list of the clock
       integer :: came_count = 0, came(2 * max_events) = 0
@@ -152,7 +152,7 @@ module mesoslip_schedule
       procedure, private :: follow_load
       procedure, non_overridable, private :: pass_clocks, break_by_clock, &
          & pass_coordinate, break_with_clocks, attach_with_clocks, &
-         & change_sign, cut_lists, skip_gone, find_met, sort_breaks
+         & change_clock, cut_lists, skip_gone, find_met, sort_breaks
    end type schedule_type
 
 contains
@@ -580,7 +580,7 @@ contains
                   self%is_over = .true.
                   exit
                end if
-               call self%change_sign(event)
+               call self%change_clock(event)
             else
                call self%break_with_clocks(time, displacement, event, self%break_origin(event))
                if (self%break_twin(event) > 0) self%clock_gone(self%break_twin(event)) = .true.
@@ -662,8 +662,8 @@ contains
       self%attached = event - 1
    end subroutine attach_with_clocks
 
-   !> Move a contact to the other clock, as its force gets the sign of the motion.
-   subroutine change_sign(self, event)
+   !> Move a contact to the clock of the motion.
+   subroutine change_clock(self, event)
       class(schedule_type), intent(inout) :: self
       !> Entry of the list by coordinate
       integer, intent(in) :: event
@@ -681,7 +681,7 @@ contains
          call self%cut_lists(origin, limit, key)
          self%broken = event - 1
       end associate
-   end subroutine change_sign
+   end subroutine change_clock
 
    !> End the lists before a contact that is not in them.
    subroutine cut_lists(self, origin, limit, key)

@@ -236,8 +236,8 @@ contains
       call self%find_next_breaks(row, displacement, time)
    end subroutine join
 
-   !> Let a population have broken up to the mean threshold up to which its contacts and others that
-   !> join it have broken: these have not broken with the others, and would never do so.
+   !> Set the threshold up to which a population has broken to the mean of that of its contacts and
+   !> that of others that join it: with the higher one, those that join would skip breaks.
    pure subroutine mean_broken(self, row, part, broken)
       class(population_rows_type), intent(inout) :: self
       integer, intent(in) :: row

@@ -4,9 +4,9 @@
 !> abs(f) = f_s (Bell's law). Contacts whose forces have one sign share a clock, the integral of
 !> omega_0 exp(s k (X - R)/f_T) over the time, where s is the sign and R a displacement near the
 !> slider's. Each contact draws an exponential deviate E once in a life. It breaks when its clock
-!> has advanced by E exp((f_s + s k (Y - R))/f_T), a key that is known when it attaches. Where its
-!> force changes its sign, the remaining deviate continues with the other clock. There is no time
-!> step.
+!> has advanced by E exp((f_s + s k (Y - R))/f_T), a key that is known when it attaches. Once its
+!> force has changed its sign, the remaining deviate continues with the other clock, from where its
+!> rate ceases to be negligible. There is no time step.
 module mesoslip_contacts_thermal_contacts
    use mesoslip_contacts_base, only: contact_parameters_type, contacts_type
    use mesoslip_contacts_individual_base, only: total_law
@@ -71,7 +71,7 @@ contains
       end do
    end subroutine initialize_thermal
 
-   !> The law holds until a contact breaks or attaches, or its force changes its sign.
+   !> The law holds until a contact breaks, attaches, or moves to the other clock.
    subroutine offer_thermal(self, pose, law, window)
       class(thermal_contacts_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
@@ -203,7 +203,7 @@ contains
          call self%order(self%ahead)%due(self%direction * pose%displacement, contact)
          if (contact == 0) return
          if (self%turns_ahead(contact)) then
-            call self%change_sign(contact)
+            call self%change_clock(contact)
          else if (self%accepts_break(contact, pose, .false.)) then
             call self%break_contact(contact, pose)
          end if
@@ -314,7 +314,7 @@ contains
       call self%order(self%ahead)%first(ahead)
    end subroutine find_ahead
 
-   !> Whether the force of a contact changes its sign ahead.
+   !> Whether a contact moves to the other clock ahead.
    pure function turns_ahead(self, contact)
       class(thermal_contacts_type), intent(in) :: self
       integer, intent(in) :: contact

@@ -1,9 +1,10 @@
 !> Contacts that break by thermal activation: their clocks, keys and order.
 !>
-!> A contact belongs to the clock of the sign of its force. Its key is the reading at which it
+!> A contact belongs to the clock of the sign of its force; as long as its rate is negligible, of
+!> that which the force had. Its key is the reading at which it
 !> breaks, relative to a reference displacement that is moved along with the slider. The direction
 !> ahead is kept until an event on the way back. Ahead, the next event of a contact is its break at
-!> the threshold or a change of the sign of its force; on the way back events are bounded.
+!> the threshold or its move to the other clock; on the way back events are bounded.
 module mesoslip_contacts_thermal_keys
    use mesoslip_contacts_individual_base, only: exchange_individual, individual_contacts_type
    use mesoslip_contacts_individual_record, only: row_limit, row_origin, row_stiffness
@@ -38,8 +39,8 @@ module mesoslip_contacts_thermal_keys
       real(wp) :: stretch = 1.0_wp
       !> Numbers of the lives, shape (life_length, count)
       real(wp), allocatable :: life(:, :)
-      !> Contacts by their next event in a motion up and down, a break at the threshold or a change
-      !> of the force's sign, then by their keys of each clock. One array, because gfortran 12 frees
+      !> Contacts by their next event in a motion up and down, a break at the threshold or a move
+      !> to the other clock, then by their keys of each clock. One array, because gfortran 12 frees
       !> only one of two components of this type
       type(scan_order_type) :: order(motions + clocks)
       !> The order of the direction ahead
@@ -56,7 +57,7 @@ module mesoslip_contacts_thermal_keys
       !> Bound on the breaking stretch of a contact, and contacts put back that are not in the order
       !> ahead
       procedure :: bound, gather_ahead
-      procedure, non_overridable :: put, insert, take_out, change_sign, clear_orders
+      procedure, non_overridable :: put, insert, take_out, change_clock, clear_orders
       procedure, non_overridable :: update_deviate, raise_limit, distance, move_reference, &
          & reverse_if_due
       procedure, non_overridable, private :: set_key
@@ -105,8 +106,8 @@ contains
       end do
    end subroutine set_up_keys
 
-   !> Move a contact to the other clock, as the sign of its force changes.
-   subroutine change_sign(self, contact)
+   !> Move a contact to the other clock.
+   subroutine change_clock(self, contact)
       class(thermal_keys_type), intent(inout) :: self
       integer, intent(in) :: contact
 
@@ -117,7 +118,7 @@ contains
       call self%take_out(contact)
       self%life(life_clock, contact) = real(clocks + 1 - old, wp)
       call self%put(contact)
-   end subroutine change_sign
+   end subroutine change_clock
 
    !> Solve the key of a contact, and insert the contact into all orders.
    subroutine put(self, contact)
@@ -172,7 +173,7 @@ contains
    end subroutine take_out
 
    !> Distance from the origin of a contact [m] to its next event in a direction, given its clock
-   !> and its breaking stretch [m]: a break at the threshold, or a change of the force's sign.
+   !> and its breaking stretch [m]: a break at the threshold, or a move to the other clock.
    pure function distance(self, number, limit, direction)
       class(thermal_keys_type), intent(in) :: self
       integer, intent(in) :: number
@@ -199,7 +200,7 @@ contains
 
    end subroutine gather_ahead
 
-   !> Also where its force changes its sign.
+   !> Also where it moves to the other clock.
    pure function behind_of(self, contact) result(coordinate)
       class(thermal_keys_type), intent(in) :: self
       integer, intent(in) :: contact
@@ -231,7 +232,7 @@ contains
    end subroutine update_deviate
 
    !> Raise the limit of a contact whose force is along the motion [m], and solve its key again. In
-   !> the order of the way back it stays where it was: there its force changes its sign. The caller
+   !> the order of the way back it stays where it was: there it moves to the other clock. The caller
    !> updates the order ahead.
    subroutine raise_limit(self, contact, limit)
       class(thermal_keys_type), intent(inout) :: self

@@ -194,7 +194,8 @@ def _of_track(record: StrokeRecord, angle: Array) -> Array:
         counts += np.bincount(part[one.samples], minlength=MIN_SAMPLES)
     means = sums / np.maximum(counts, 1)
     middles = (np.arange(MIN_SAMPLES) + 0.5) / MIN_SAMPLES
-    return np.interp(angle % 1, middles, means - means.mean(), period=1)
+    track: Array = np.interp(angle % 1, middles, means - means.mean(), period=1)
+    return track
 
 
 def _row(record: StrokeRecord, piece: Piece, track: Array) -> Stroke:

@@ -531,6 +531,11 @@ def test_the_track_is_no_error_of_whole_revolutions() -> None:
     errors = rows["mean_friction_error"]
     assert np.median(errors) < 0.015
     assert np.mean(np.abs(rows["mean_friction"] - 5) < 1.96 * errors) > 0.9
+    # The picture has as many revolutions, by the same period or as found.
+    for period in ("733 ms", "auto"):
+        figure = mesoslip.plot(record_tree(time, force), view="strokes", period=period)
+        places = figure.axes[1].containers[0].lines[0].get_xdata()
+        assert len(places) == len(rows["mean_friction"])
 
 
 def strokes_of_made(number: int, tmp_path):

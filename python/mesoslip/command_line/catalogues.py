@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Any, TypeVar
 
 import typer
 
@@ -12,6 +12,7 @@ from mesoslip.command_line.options import (
     JsonOption,
     LatexOption,
     OutputArgument,
+    RevolutionOption,
     TableOption,
     counted,
     format_option,
@@ -19,6 +20,7 @@ from mesoslip.command_line.options import (
     positive_or_none,
     print_json,
     print_table,
+    revolution_of,
     share,
     show,
     show_all,
@@ -291,9 +293,7 @@ def strokes(
     middle: Annotated[
         str, option("Share of a stroke over which friction is averaged, in its middle", "SHARE")
     ] = "80%",
-    period: Annotated[
-        str | None, option("Time of a revolution of a disc, such as '0.92 s', or auto", "TIME")
-    ] = None,
+    period: RevolutionOption = None,
 ) -> None:
     """Print strokes, cycles and revolutions of a reciprocating record.
 
@@ -302,8 +302,6 @@ def strokes(
     from mesoslip.analysis import strokes as analysis
 
     part = share(middle, "--middle")
-    time: float | Literal["auto"] | None = "auto"
-    if period != "auto":
-        time = positive_or_none(period, "--period", "s", "0.92 s")
+    time = revolution_of(period)
     find = partial(analysis.strokes_of, middle=part, name=str(output), period=time)
     show_catalogue(output, find, table, as_json=as_json, as_latex=as_latex, latex_table=-1)

@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, Protocol, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, Protocol, TypeVar
 
 import typer
 
@@ -87,6 +87,10 @@ OutputsArgument = Annotated[
     list[Path], typer.Argument(help="Outputs of mesoslip", metavar="OUT.nc...")
 ]
 SavedOption = Annotated[Path | None, output_option("Output file; out/<stem>.nc by default")]
+RevolutionOption = Annotated[
+    str | None,
+    option("Time of a revolution of a disc, such as '0.92 s', or auto", "TIME", "--period"),
+]
 SetOption = Annotated[
     list[str] | None,
     option(
@@ -326,6 +330,11 @@ def quantity(
 def positive_or_none(text: str | None, option: str, unit: str, example: str) -> float | None:
     """The value of an option that is a quantity above 0, in SI; None without it."""
     return None if text is None else quantity(text, option, unit, example, positive=True)
+
+
+def revolution_of(text: str | None) -> float | Literal["auto"] | None:
+    """The time of a revolution [s], or "auto"; None without it."""
+    return "auto" if text == "auto" else positive_or_none(text, "--period", "s", "0.92 s")
 
 
 def share(text: str, option: str) -> float:

@@ -12,7 +12,14 @@ import typer
 from typer.core import TyperCommand, TyperOption
 
 from mesoslip.array_packages import hidden
-from mesoslip.command_line.options import OutputsArgument, option, output_option, time_of
+from mesoslip.command_line.options import (
+    OutputsArgument,
+    RevolutionOption,
+    option,
+    output_option,
+    revolution_of,
+    time_of,
+)
 from mesoslip.command_line.progress import progress_shown
 from mesoslip.command_line.quick_matplotlib import import_matplotlib
 
@@ -120,6 +127,7 @@ def plot(
             "--x", help="Abscissa: time, or the displacement of the slider or of the drive"
         ),
     ] = None,
+    period: RevolutionOption = None,
     file_format: Annotated[
         str | None,
         option(
@@ -177,6 +185,7 @@ def plot(
             x=None if x is None else x.value,
             start=-math.inf if start is None else time_of(start, "--from"),
             end=math.inf if end is None else time_of(end, "--to"),
+            period=revolution_of(period),
             width=width if width is None or width in JOURNALS else width_of(width, "--width"),
             font_size=font_size,
             title=title,

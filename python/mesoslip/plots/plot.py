@@ -9,6 +9,7 @@ import string
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
+from typing import Literal
 
 import matplotlib as mpl
 from matplotlib.axes import Axes
@@ -46,6 +47,7 @@ def plot(
     start: float | str = -math.inf,
     end: float | str = math.inf,
     x: str | None = None,
+    period: float | str | None = None,
     figure: Figure | SubFigure | None = None,
     ax: Axes | None = None,
     width: float | str | None = None,
@@ -84,6 +86,9 @@ def plot(
         Horizontal axis of a run: "time", "displacement" of the slider, or "drive" for the
         displacement of the drive; by default the time, of a slider without inertia its
         displacement.
+    period
+        Time of a revolution of a disc, for the view "strokes": seconds, a quantity such as
+        "0.92 s", or "auto", by which the force repeats itself.
     figure
         Figure, or part of one, to draw into; a new one by default.
     ax
@@ -132,7 +137,10 @@ def plot(
         _quantity("end", end, "s", "2 s"),
         x,
     )
-    options = Options(extent, _whole("snapshot", snapshot))
+    turn: float | Literal["auto"] | None = "auto"
+    if period != "auto":
+        turn = None if period is None else _quantity("period", period, "s", "0.92 s")
+    options = Options(extent, _whole("snapshot", snapshot), period=turn)
     if isinstance(width, str) and width in JOURNALS:
         journal = JOURNALS[width]
         width, font_size = journal.width, journal.font_size if font_size is None else font_size

@@ -119,8 +119,8 @@ def record_of(tree: Tree, realization: int = 0, name: str = "the output") -> Str
         raise FileError(
             f"{name}: does not go back and forth: the {source} has no reversals"
             if source != FORCE
-            else f"{name}: does not go back and forth, as far as the sign of the force shows; no "
-            "displacement is known"
+            else f"{name}: does not go back and forth, as far as the sign of the force shows, and "
+            "no displacement is known; for revolutions of a disc give --period"
         )
     return record_in(tree, realization, pieces, source)
 

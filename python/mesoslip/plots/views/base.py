@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Literal, TypeAlias
 
 from matplotlib.axes import Axes
 
@@ -27,6 +27,8 @@ class Options:
     """Number of a snapshot of the contacts."""
     measure: str | None = None
     """Measure of a sweep."""
+    period: float | Literal["auto"] | None = None
+    """Time of a revolution of a disc [s]."""
 
     @property
     def given(self) -> set[str]:
@@ -37,6 +39,7 @@ class Options:
             "x": self.extent.against is not None,
             "snapshot": self.snapshot is not None,
             "measure": self.measure is not None,
+            "period": self.period is not None,
         }
         return {name for name, given in is_given.items() if given}
 

@@ -174,7 +174,7 @@ def draw_panel(axes: Axes, tree: Tree, options: Options) -> None:
 
 
 def _found(tree: Tree, options: Options) -> Strokes:
-    return strokes_of(tree, realization=options.extent.realization or 0)
+    return strokes_of(tree, realization=options.extent.realization or 0, period=options.period)
 
 
 VIEW = View(
@@ -183,6 +183,6 @@ VIEW = View(
     summary="loops, friction over strokes, and over position and stroke",
     draw_all=draw,
     panel=draw_panel,
-    options=frozenset({"realization"}),
+    options=frozenset({"realization", "period"}),
     takes_arrays=True,
 )

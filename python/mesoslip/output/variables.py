@@ -149,6 +149,7 @@ MEASURED = Group(
     revolutions=Meaning("1", "number of revolutions of the disc"),
     rotation_speed=Meaning("s-1", "revolutions of the disc per time"),
     sliding_speed=Meaning("m s-1", "speed of sliding"),
+    viscosity=Meaning("Pa s", "viscosity of the lubricant"),
     acoustic_emission=Meaning("V", "acoustic emission, or another second channel"),
 )
 # Variables with the force of a run or of a measured trace, and their units.

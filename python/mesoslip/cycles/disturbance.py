@@ -19,7 +19,7 @@ from mesoslip.cycles.settling import Settled
 from mesoslip.simulation.kernel import Words
 
 # Relative modulation of the density of pinned contacts, and maximum number of cycles after it.
-MODULATION, MAX_RETURN = 0.05, 16
+MODULATION, MAX_RETURN = 0.05, 64
 # Distance of period and peaks from the cycle, and their change in each of the last two cycles, over
 # the maximum distance, below which a motion returns; minimum number of cycles.
 RETURNED, MIN_RETURN = 0.1, 5

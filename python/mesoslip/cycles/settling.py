@@ -37,6 +37,8 @@ SHRINKING, SETTLING, SLOWLY = 0.98, 0.5, 0.9
 # Ratios up to which spreads and changes of cycles of different lengths count as equal; the shorter
 # cycle is then chosen. A true cycle of several passages has much smaller ones than a shorter cycle.
 EQUAL_SPREAD, EQUAL_CHANGE = 3.0, 10.0
+# Passages of a motion whose changes still shrink, over the maximum number of those of others.
+SLOW_PASSAGES = 3
 # Amplitude over F_s below which sliding is smooth.
 MIN_AMPLITUDE = 1e-3
 # Time before the first section, in times of loading plus periods of the setup.
@@ -122,7 +124,8 @@ def settle(
     error of period and peaks. After ``max_cycles`` passages a motion that has not settled is
     compared with itself later, and with the batches of a motion that led to the state and did not
     settle at a coarse resolution. ``progress`` is called with the passages over that number.
-    With ``max_passages`` a motion that needs more is irregular.
+    With ``max_passages`` a motion that needs more is irregular, three times as many where its
+    changes still shrink.
     """
     start = 0.0 if words is None else time_of(words)
     run = _Settling(motion, is_stable, root, tolerance, start, max_passages)
@@ -200,7 +203,7 @@ class _Settling:
         self._restart()
         self._level = level
         self._limit = self._limit or self._max_passages or max_cycles
-        while self._count < self._limit:
+        while self._count < self._limit or self._settles_slowly():
             passage = self._motion.next_passage(words, level)
             self._count += 1
             if progress is not None:
@@ -252,6 +255,14 @@ class _Settling:
             if late < SETTLING * early:
                 return True
         return False
+
+    def _settles_slowly(self) -> bool:
+        """Whether the changes over a cycle still shrink, of a motion with a maximum of passages."""
+        if self._count >= SLOW_PASSAGES * (self._max_passages or 0) or len(self._rows) < 6:
+            return False
+        sizes = np.max(np.abs(self._differences(self._multiple()[0])), axis=1)
+        _, middle, late = (float(np.median(one)) for one in np.array_split(sizes, 3))
+        return late < SLOWLY * middle
 
     def _spread(self) -> tuple[int, float]:
         """Number of passages in a cycle with the smallest relative spread, and that spread."""

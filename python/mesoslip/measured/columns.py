@@ -41,6 +41,7 @@ EXAMPLES = {
     "torque": "torque [N m]",
     "radius": "radius [mm]",
     "sliding_speed": "sliding_speed [m/s]",
+    "viscosity": "viscosity [mPa*s]",
     "acoustic_emission": "acoustic_emission [V]",
 }
 # Other names in the headers of options and tables.

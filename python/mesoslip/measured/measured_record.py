@@ -28,7 +28,7 @@ MIN_SAMPLES = 4
 # Quantities of a record that are variables of outputs.
 SIGNALS = (
     *("normal_force", "normal_stress", "revolutions", "rotation_speed", "sliding_speed"),
-    "acoustic_emission",
+    *("viscosity", "acoustic_emission"),
 )
 
 

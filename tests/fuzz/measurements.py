@@ -443,7 +443,7 @@ def wrong_samples(case: Case, time: Array, force: Array, changed: list[int]) -> 
 def check_whole(case: Case, path: Path) -> list[str]:
     """What is wrong with the reading of a file in some style."""
     from mesoslip import MesoslipError
-    from mesoslip.measured.trace import understand
+    from mesoslip.measured.understanding import understand
 
     try:
         record = understand(path, **case.options).record
@@ -471,7 +471,7 @@ def check(case: Case, path: Path, changed: list[int], how: str) -> tuple[str, li
         "refused", "right", or "guessed" if what is wrong is reported as a guess; and problems.
     """
     from mesoslip import FileError
-    from mesoslip.measured.trace import understand
+    from mesoslip.measured.understanding import understand
 
     try:
         record = understand(path, **case.options).record

@@ -493,7 +493,11 @@ def test_messages_name_what_would_be_right(short, tmp_path, command):
     assert "there is no sample from 70 s on" in command("plot", output, "--from", "70")[2]
     still = ("--set", "drive.velocity=1e-12", "-o", tmp_path / "still.nc")
     printed = command("run", short, *still)[2]
-    assert "no contact broke: the drive moves 2.2 pm, and F_s/K is 185.6 nm" in printed
+    assert "no contact broke: the path of the drive is 2.2 pm, and F_s/K is 185.6 nm" in printed
+    cycle = "drive.cycle={amplitude='1 nm', cycles=1, velocity='0.1 um/s'}"
+    strokes = ("--set", "drive.velocity=none", "--set", cycle, "-o", tmp_path / "strokes.nc")
+    # A longer run would show no regime.
+    assert f"'mesoslip strokes {tmp_path / 'strokes.nc'}'" in command("run", short, *strokes)[2]
     lost = tmp_path / "lost.toml"
     lost.write_text('base = "nothing.toml"\n')
     printed = command.refusal("info", lost)

@@ -13,7 +13,7 @@ from mesoslip import ConfigError, FileError
 from mesoslip.measured.reading import blocks
 from mesoslip.measured.reading.file import read_file
 from mesoslip.measured.reading.stamps import Chosen, chosen_order
-from mesoslip.measured.trace import understand
+from mesoslip.measured.understanding import understand
 
 COUNT = 300
 SECONDS = 0.01 * np.arange(COUNT)

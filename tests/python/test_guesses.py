@@ -6,7 +6,7 @@ import mesoslip
 import numpy as np
 import pytest
 from mesoslip.analysis.strokes import strokes_of
-from mesoslip.measured.trace import understand
+from mesoslip.measured.understanding import understand
 
 COUNT = 40
 TIME = [f"{0.1 * n:.1f}" for n in range(COUNT)]

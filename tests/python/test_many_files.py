@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from mesoslip import FileError
 from mesoslip.measured.batch import COLUMNS
-from mesoslip.measured.trace import understand
+from mesoslip.measured.understanding import understand
 
 STEP = 0.01
 RISE, PERIOD = 0.05, 40

@@ -17,7 +17,7 @@ from conftest import ROOT, long
 from mesoslip.measured.headers import read_header
 from mesoslip.measured.reading.file import READERS, read_file
 from mesoslip.measured.sampling import in_order, sampling_report, sampling_summary
-from mesoslip.measured.trace import understand
+from mesoslip.measured.understanding import understand
 from mesoslip.measured.units import size_of
 from scipy.io import netcdf_file, savemat
 

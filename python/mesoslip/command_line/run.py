@@ -186,7 +186,7 @@ def _report_results(results: Results, config: Config, path: Path, stop: Stop) ->
     if config.drive.is_force:
         say(f"{path}: {_mean_velocity(results, config)}")
     else:
-        say(f"{path}: {_regimes(results, path, stop)}")
+        say(f"{path}: {_regimes(results, config, path, stop)}")
     if known["break_count"] == 0:
         say(f"{path}: no contact broke: {_short_drive(config)}")
     if known["audit"] != "passed":
@@ -212,16 +212,21 @@ def _short_drive(config: Config) -> str:
 
     if not 0 < config.spring_stiffness < math.inf:
         return "the drive did not move far enough"
-    path_length = math.fsum(part.path_length for part in config.drive_parts)
-    needed = config.contacts.static_force / config.spring_stiffness
-    return f"the drive moves {with_unit(path_length, 'm')}, and F_s/K is {with_unit(needed, 'm')}"
+    lengths = (
+        math.fsum(part.path_length for part in config.drive_parts),
+        config.contacts.static_force / config.spring_stiffness,
+    )
+    path_length, needed = (with_unit(one, "m") for one in lengths)
+    return f"the path of the drive is {path_length}, and F_s/K is {needed}"
 
 
-def _regimes(results: Results, path: Path, stop: Stop) -> str:
+def _regimes(results: Results, config: Config, path: Path, stop: Stop) -> str:
     """The regimes of all realizations, which may take longer than short runs; after an interrupt,
-    the command that prints them."""
+    or of strokes, the command that evaluates them."""
     from mesoslip.analysis import regime
 
+    if config.drive.cycle is not None:
+        return f"the drive goes back and forth; 'mesoslip strokes {path}' evaluates its strokes"
     found: list[regime.RegimeResult] = []
     count = len(results.realizations)
     with progress_shown(count == 1, "regimes") as progress:

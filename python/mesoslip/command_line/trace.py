@@ -144,7 +144,8 @@ def trace(
     options: dict[str, Any] = {k: one for k, one in locals().items() if k not in NOT_DESCRIBING}
     options["headers"] = options.pop("columns")
     from mesoslip.measured.batch import output_name
-    from mesoslip.measured.trace import trace_of, understand
+    from mesoslip.measured.trace import trace_of
+    from mesoslip.measured.understanding import understand
     from mesoslip.output import targets, writing
 
     if batch is not None:

@@ -16,7 +16,8 @@ from mesoslip.analysis.regime import NAMES, regimes
 from mesoslip.errors import ConfigError, FileError, MesoslipError, Problem, shown
 from mesoslip.execution.executors import ExecutorLike, ThreadsThenProcesses, as_executor, completed
 from mesoslip.execution.stop import Stop, StopRequest
-from mesoslip.measured.trace import trace_of, understand
+from mesoslip.measured.trace import trace_of
+from mesoslip.measured.understanding import understand
 from mesoslip.output import targets, writing
 from mesoslip.output.variables import force_among
 

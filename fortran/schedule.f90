@@ -8,11 +8,16 @@
 !>
 !> With clocks of thermally activated breaking a contact may be in two lists, by coordinate and by
 !> the reading of a clock; after it broke as an entry of one list, that of the other is gone.
+!>
+!> Of thresholds that grow the coordinates are bounds. Before each step those of contacts that may
+!> break in it are evaluated, and their breaks extrapolated from the motion of the slider.
 module mesoslip_schedule
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_numerics_accumulator, only: accumulator_type
+   use mesoslip_ageing_law, only: ageing_law_type
    use mesoslip_hazard, only: hazard_type
-   use mesoslip_interface_law, only: clocks, interface_law_type, window_type
+   use mesoslip_interface_law, only: clocks, interface_law_type, pose_type, window_type
+   use mesoslip_motion_prediction, only: prediction_type
    use mesoslip_track_strength, only: track_strength_type
    implicit none
    private
@@ -114,9 +119,28 @@ module mesoslip_schedule
       logical :: breaks_now = .false.
       !> For each attachment the deviate, and the reading at which the contact breaks [s]
       real(wp) :: attach_left(max_events) = 0.0_wp, attach_key(max_events) = 0.0_wp
+
+      !> Whether thresholds grow; how, and the motion of the slider as predicted
+      logical :: has_growth = .false.
+      type(ageing_law_type) :: ageing
+      type(prediction_type) :: prediction
+      !> Distance to its threshold at which a contact breaks [m]; coordinate before which no contact
+      !> breaks that is not listed, that before which none does in the next step [m], and the time
+      !> at which this ends [s]; maximum distance by which one broke too late [m]
+      real(wp) :: resolution = 0.0_wp, unlisted = huge(1.0_wp), meeting = huge(1.0_wp), &
+         & window_time = huge(1.0_wp), lateness = 0.0_wp
+      !> Number of breaks as written; for each break its entry then: the order changes as thresholds
+      !> grow. For each entry whether its threshold is constant; its stretch at the coordinate, its
+      !> configured breaking stretch and the mean one [m], and the time of its birth [s]
+      integer :: written = 0, break_entry(max_events) = 0
+      logical :: entry_is_constant(max_events) = .false.
+      real(wp) :: entry_limit(max_events) = 0.0_wp, entry_configured(max_events) = 0.0_wp, &
+         & entry_mean(max_events) = 0.0_wp, entry_birth(max_events) = 0.0_wp
    contains
       !> Contact force until the next event, and the window until then
       procedure, non_overridable :: law, window
+      !> Find where the next step ends, if thresholds grow
+      procedure, non_overridable :: look_ahead
       !> Number of contacts that broke
       procedure, non_overridable :: break_count
       !> Make the events that are due at a time and a displacement
@@ -128,7 +152,7 @@ module mesoslip_schedule
       procedure, private :: follow_load
       procedure, non_overridable, private :: pass_clocks, break_by_clock, &
          & pass_coordinate, break_with_clocks, attach_with_clocks, &
-         & change_sign, cut_lists, skip_gone
+         & change_sign, cut_lists, skip_gone, find_met, sort_breaks
    end type schedule_type
 
 contains
@@ -150,14 +174,21 @@ contains
       real(wp), intent(in) :: time
       type(window_type) :: window
 
+      real(wp) :: ahead
+
       window%end_time = min(self%attach_time(self%attached + 1), &
          & self%site_time(self%moved + 1), self%end_time, time + self%max_step)
+      ahead = self%break_coordinate(self%broken + 1)
+      if (self%has_growth) then
+         ahead = self%meeting
+         window%end_time = min(window%end_time, self%window_time)
+      end if
       if (self%direction > 0.0_wp) then
-         window%upper = self%break_coordinate(self%broken + 1)
+         window%upper = ahead
          window%lower = self%behind
       else
          window%upper = -self%behind
-         window%lower = -self%break_coordinate(self%broken + 1)
+         window%lower = -ahead
       end if
       if (self%has_clocks) call self%hazard%limit_window(window)
    end function window
@@ -181,6 +212,7 @@ contains
          call self%pass_clocks(time, displacement)
          return
       end if
+      if (self%has_growth) call self%find_met(time, displacement)
       if (self%break_coordinate(self%broken + 1) <= self%direction * displacement) then
          if (self%is_bounded) then
             self%at_bound = .true.
@@ -204,7 +236,7 @@ contains
       class(schedule_type), intent(inout) :: self
       real(wp), intent(in) :: time, displacement
 
-      integer :: event, broken
+      integer :: event, broken, entry
 
       do event = self%broken + 1, self%breaks
          if (self%break_coordinate(event) > self%direction * displacement) exit
@@ -216,7 +248,9 @@ contains
       end do
       if (self%has_births) then
          do broken = self%broken + 1, event - 1
-            call self%insert_attachment(broken, time, self%break_drag(broken))
+            entry = broken
+            if (self%has_growth) entry = self%break_entry(broken)
+            call self%insert_attachment(entry, time, self%break_drag(broken))
          end do
       else if (self%broken == 0) then
          ! With one delay for all, those that break now attach after all listed ones.
@@ -363,11 +397,110 @@ contains
 
       self%behind = max(self%behind, self%direction * origin - limit)
       ahead = self%direction * origin + limit
+      if (self%has_growth) then
+         self%unlisted = min(self%unlisted, ahead)
+         return
+      end if
       do while (self%breaks > self%broken)
          if (self%break_coordinate(self%breaks) < ahead) exit
          self%breaks = self%breaks - 1
       end do
    end subroutine cut_breaks
+
+   !> Find where the next step ends, if thresholds grow: at the first break by extrapolation of
+   !> those that may come in it. The schedule is over where a contact that is not listed may break.
+   subroutine look_ahead(self, pose)
+      class(schedule_type), intent(inout) :: self
+      !> Complete pose of the slider
+      type(pose_type), intent(in) :: pose
+
+      real(wp) :: reach, coordinate
+      integer :: event
+
+      if (.not. self%has_growth) return
+      call self%prediction%predict(pose, self%law())
+      self%window_time = min(self%attach_time(self%attached + 1), self%site_time(self%moved + 1))
+      call self%prediction%limit_time(pose, self%window_time)
+      reach = self%prediction%reach(pose, self%direction, self%window_time)
+      self%meeting = huge(1.0_wp)
+      do event = self%broken + 1, self%breaks
+         if (.not. self%break_coordinate(event) < min(self%meeting, reach)) exit
+         coordinate = self%break_coordinate(event)
+         associate (entry => self%break_entry(event), &
+            & origin => self%direction * self%break_origin(event))
+            if (.not. self%entry_is_constant(entry)) then
+               call self%prediction%meet(self%ageing, self%entry_configured(entry), &
+                  & self%entry_mean(entry), pose%time - self%entry_birth(entry), origin, pose, &
+                  & self%direction, self%resolution, self%entry_limit(entry), coordinate)
+               self%break_coordinate(event) = origin + self%entry_limit(entry)
+            end if
+         end associate
+         self%meeting = min(self%meeting, coordinate)
+      end do
+      self%is_over = self%unlisted < min(self%meeting, reach)
+      self%meeting = min(self%meeting, self%unlisted)
+      if (event <= self%breaks) self%meeting = min(self%meeting, self%break_coordinate(event))
+      call self%sort_breaks(event - 1)
+   end subroutine look_ahead
+
+   !> Evaluate the thresholds that a slider at a displacement [m] may have met at a time [s]. Those
+   !> that it has get its coordinate, so that they are due.
+   subroutine find_met(self, time, displacement)
+      class(schedule_type), intent(inout) :: self
+      real(wp), intent(in) :: time, displacement
+
+      real(wp) :: here, gap
+      integer :: event
+
+      call self%prediction%complete()
+      here = self%direction * displacement
+      do event = self%broken + 1, self%breaks
+         if (.not. self%break_coordinate(event) < here + 2.0_wp * self%resolution) exit
+         associate (entry => self%break_entry(event))
+            if (self%entry_is_constant(entry)) cycle
+            self%entry_limit(entry) = self%ageing%threshold(self%entry_configured(entry), &
+               & self%entry_mean(entry), time - self%entry_birth(entry))
+            self%break_coordinate(event) = self%direction * self%break_origin(event) &
+               & + self%entry_limit(entry)
+         end associate
+      end do
+      call self%sort_breaks(event - 1)
+      do event = self%broken + 1, self%breaks
+         gap = self%break_coordinate(event) - here
+         if (self%entry_is_constant(self%break_entry(event))) then
+            if (gap > 0.0_wp) exit
+         else
+            if (gap > self%resolution) exit
+            self%lateness = max(self%lateness, -gap)
+         end if
+         self%break_coordinate(event) = here
+      end do
+   end subroutine find_met
+
+   !> Sort the breaks again whose coordinates have grown, up to the last of them.
+   subroutine sort_breaks(self, last)
+      class(schedule_type), intent(inout) :: self
+      integer, intent(in) :: last
+
+      real(wp) :: coordinate, origin
+      integer :: event, place, entry
+
+      do event = min(last, self%breaks - 1), self%broken + 1, -1
+         coordinate = self%break_coordinate(event)
+         if (coordinate <= self%break_coordinate(event + 1)) cycle
+         origin = self%break_origin(event)
+         entry = self%break_entry(event)
+         do place = event, self%breaks - 1
+            if (coordinate <= self%break_coordinate(place + 1)) exit
+            self%break_coordinate(place) = self%break_coordinate(place + 1)
+            self%break_origin(place) = self%break_origin(place + 1)
+            self%break_entry(place) = self%break_entry(place + 1)
+         end do
+         self%break_coordinate(place) = coordinate
+         self%break_origin(place) = origin
+         self%break_entry(place) = entry
+      end do
+   end subroutine sort_breaks
 
    !> The same as pass with clocks: contacts break by their clock, then by coordinate, then others
    !> attach. At the end of the schedule further events that are due are left to the contacts.
@@ -429,8 +562,8 @@ contains
       call self%skip_gone()
    end subroutine break_by_clock
 
-   !> Break the contacts that have reached their thresholds, and move those to the other clock whose
-   !> forces have changed their sign.
+   !> Break the contacts that have reached their thresholds, and move those to the other clock that
+   !> have reached where they turn.
    subroutine pass_coordinate(self, time, displacement)
       class(schedule_type), intent(inout) :: self
       real(wp), intent(in) :: time, displacement

@@ -77,6 +77,7 @@ contains
             schedule%breaks = schedule%breaks - 1
          end do
          schedule%is_over = schedule%breaks == 0
+         schedule%unlisted = min(schedule%unlisted, direction * displacement)
       else
          schedule%behind = max(schedule%behind, schedule%direction * displacement)
       end if

@@ -38,18 +38,23 @@ contains
    subroutine plan(state)
       class(state_type), intent(inout) :: state
 
+      type(pose_type) :: pose
+
       state%schedule%is_over = .true.
       if (state%max_schedule == 0 .or. state%avalanches%needs_each() &
          & .or. abs(state%slider%drive%acceleration) > 0.0_wp &
          & .or. state%contacts%schedule_length < min_length) return
-      call state%contacts%plan(state%slider%pose(), &
-         & min(state%max_schedule, state%contacts%schedule_length), state%schedule)
+      pose = state%slider%pose()
+      call state%slider%complete_pose(pose)
+      call state%contacts%plan(pose, min(state%max_schedule, state%contacts%schedule_length), &
+         & state%schedule)
       call state%stop%limit_schedule(state%schedule, state%slider%origin)
       state%schedule%end_time = min(state%slider%drive%end_of_part(), state%steady%block_end, &
          & state%schedule%site_time(state%schedule%sites + 1))
       state%schedule%max_step = state%recorder%max_step()
       state%schedule%mean_stiffness = state%contacts%parameters%stiffness
       state%schedule%max_force = shift_stretches * state%contacts%parameters%static_force
+      if (.not. state%schedule%is_over) call state%schedule%look_ahead(pose)
    end subroutine plan
 
    !> The slider runs ahead through the schedule, and contacts keep their books afterwards.
@@ -87,6 +92,7 @@ contains
       integer(i8), intent(in) :: last
 
       type(step_filter_type) :: filter
+      type(pose_type) :: pose
 
       filter = state%recorder%step_filter(state%slider)
       call state%slider%select_extremes(filter)
@@ -103,6 +109,10 @@ contains
       call state%slider%note_extreme()
       if (state%slider%direction * state%schedule%direction < 0.0_wp) return
       call state%schedule%pass(state%slider%time, state%slider%displacement)
+      if (state%schedule%is_over) return
+      pose = state%slider%pose()
+      call state%slider%complete_pose(pose)
+      call state%schedule%look_ahead(pose)
    end subroutine take_steps
 
 end module mesoslip_loop_scheduled

@@ -92,9 +92,11 @@ contains
       ! The compiler makes a copy for each constant.
       if (schedule%has_clocks) then
          self%has_clocks = .true.
-         call run_through(self, schedule, filter, .true.)
+         call run_through(self, schedule, filter, .true., .false.)
+      else if (schedule%has_growth) then
+         call run_through(self, schedule, filter, .false., .true.)
       else
-         call run_through(self, schedule, filter, .false.)
+         call run_through(self, schedule, filter, .false., .false.)
       end if
    end subroutine run_ahead
 
@@ -102,14 +104,15 @@ contains
    !> known only after a chain of operations, each of which waits for the one before, and the
    !> processor cannot predict whether a contact breaks or attaches then. Meanwhile work and losses
    !> of the step before are added up.
-   subroutine run_through(self, schedule, filter, has_clocks)
+   subroutine run_through(self, schedule, filter, has_clocks, has_growth)
       type(slider_rigid_type), intent(inout) :: self
       type(schedule_type), intent(inout) :: schedule
       type(step_filter_type), intent(inout) :: filter
-      !> Whether the schedule has clocks
-      logical, intent(in) :: has_clocks
+      !> Whether the schedule has clocks, or thresholds that grow
+      logical, intent(in) :: has_clocks, has_growth
 
       type(system_type) :: system
+      type(pose_type) :: pose
       type(interface_law_type) :: law
       type(window_type) :: window
       type(rigid_motion_type) :: motion
@@ -121,6 +124,10 @@ contains
       system = constants(self)
       motion = self%motion()
       is_pending = .false.
+      if (has_growth) then
+         pose = self%pose()
+         call self%complete_pose(pose)
+      end if
       do
          step_time = motion%time
          start_displacement = motion%displacement
@@ -165,6 +172,16 @@ contains
          if (filter%is_selected .or. motion%direction * schedule%direction < 0.0_wp) exit
          call schedule%pass(motion%time, motion%displacement)
          if (schedule%is_over .or. filter%steps >= filter%max_steps) exit
+         if (has_growth) then
+            pose%time = motion%time
+            pose%displacement = motion%displacement
+            pose%velocity = motion%velocity
+            pose%acceleration = step%acceleration
+            pose%direction = motion%direction
+            pose%damper = motion%damper
+            call schedule%look_ahead(pose)
+            if (schedule%is_over) exit
+         end if
       end do
       if (.not. is_pending) return
       call audit(self, books, motion)

@@ -65,6 +65,10 @@ contains
       case ("ageing")
          call new_parameters(parameters, [character(len=name_length) :: common, ageing, &
             & "slider_jumps"], [values, relax, merge(1.0_wp, 0.0_wp, slider == "quasistatic")])
+      case ("ageing loaded")
+         call new_parameters(parameters, [character(len=name_length) :: common, ageing, &
+            & "slider_jumps", "load_mean", "load_amplitude", "load_rate", "load_phase"], &
+            & [values, relax, 0.0_wp, 0.7_wp, 0.3_wp, 600.0_wp, 0.0_wp])
       case ("ageing populations")
          call new_parameters(parameters, [character(len=name_length) :: common, ageing, &
             & "resolution"], [values, relax, 0.5_wp])
@@ -95,6 +99,7 @@ contains
       call parameters%add_word("threshold_law", law)
       kind = contacts
       if (contacts == "loaded") kind = "ensemble"
+      if (contacts == "ageing loaded") kind = "ageing"
       law_of_delay = "fixed"
       if (index(contacts, "scattered") > 0) then
          kind = merge("thermal ", "ensemble", contacts(:1) == "t")

@@ -1,8 +1,8 @@
 !> Ageing laws: limits, rates by differences, and the contacts that break under a force.
 program test_ageing_law
    use mesoslip_contacts_ageing_law, only: ageing_law_type, take_ageing_law
-   use mesoslip_contacts_ageing_meeting, only: meet, meet_bound, meet_newborn
-   use mesoslip_contacts_ageing_prediction, only: prediction_type
+   use mesoslip_contacts_ageing_meeting, only: meet, meet_newborn
+   use mesoslip_motion_prediction, only: prediction_type
    use mesoslip_contacts_threshold_laws, only: new_threshold_law
    use mesoslip_contacts_threshold_laws_base, only: threshold_law_type
    use mesoslip_interface_law, only: interface_law_type, pose_type
@@ -227,12 +227,6 @@ contains
                      & + 0.01_wp * part * time) > stretch + 0.01_wp * part * (found - stretch)
                end do
                call check(is_first, "it was not met before")
-               if (law%falls(configured(place), 1.0_wp)) cycle
-               call check(meet_bound(law, configured(place), 1.0_wp, ages(age), stretch, &
-                  & speeds(speed)) <= found + 1.0e-15_wp, "a bound from below")
-               call check(meet_bound(law, configured(place), 1.0_wp, ages(age), found - 1.0e-4_wp, &
-                  & speeds(speed)) >= law%threshold(configured(place), 1.0_wp, ages(age)), &
-                  & "not below the threshold of now")
             end do
          end do
          do place = 1, size(configured)

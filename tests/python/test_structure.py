@@ -33,11 +33,17 @@ MAY_USE: dict[str, set[str]] = {
     "interface_law": {"numerics"},
     "hazard": {"numerics", "interface_law"},
     "track_strength": {"numerics"},
-    "schedule": {"numerics", "interface_law", "hazard", "track_strength"},
+    "ageing_law": {"numerics"},
+    "motion_prediction": {"numerics", "interface_law", "ageing_law"},
+    "schedule": {
+        *("numerics", "interface_law", "hazard", "track_strength"),
+        *("ageing_law", "motion_prediction"),
+    },
     "step_filter": {"numerics"},
     "drive": {"numerics", "extremes"},
     "contacts": {
         *("numerics", "interface_law", "hazard", "track_strength", "schedule", "normal_load"),
+        *("ageing_law", "motion_prediction"),
     },
     "sliders": {"numerics", "interface_law", "hazard", "schedule", "step_filter", "drive"},
     "recording": {

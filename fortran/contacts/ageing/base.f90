@@ -1,8 +1,8 @@
 !> State of contacts that age, and where each of them breaks.
 module mesoslip_contacts_ageing_base
    use mesoslip_contacts_ageing_law, only: ageing_law_type
-   use mesoslip_contacts_ageing_meeting, only: meet, meet_bound
-   use mesoslip_contacts_ageing_prediction, only: prediction_type
+   use mesoslip_contacts_ageing_meeting, only: meet
+   use mesoslip_motion_prediction, only: prediction_type
    use mesoslip_contacts_individual_base, only: individual_contacts_type
    use mesoslip_contacts_individual_queue, only: contact_queue_type
    use mesoslip_contacts_individual_record, only: row_limit, row_origin, row_renewal, &
@@ -53,14 +53,13 @@ module mesoslip_contacts_ageing_base
    end type list_type
 
    !> Contacts that age. The limit in a record is a lower bound on the stretch at which the contact
-   !> breaks in the direction of motion.
+   !> breaks in the direction of motion: in a steady motion where it does, otherwise its threshold
+   !> when it was evaluated last, or when it is old if the threshold falls.
    type, abstract, extends(individual_contacts_type) :: ageing_contacts_type
       !> How thresholds change
       type(ageing_law_type) :: ageing
       !> Whether the slider may jump at a fixed time when the law changes
       logical :: jumps = .false.
-      !> Whether the limits depend on the speed of the queue
-      logical :: may_outrun = .true.
       !> Mean configured breaking stretch [m]
       real(wp) :: stretch = 1.0_wp
       !> Numbers of the lives, shape (life_length, count)
@@ -84,11 +83,10 @@ module mesoslip_contacts_ageing_base
       real(wp) :: now = 0.0_wp
       !> Motion of the slider as predicted under the law that was offered last
       type(prediction_type) :: prediction
-      !> Whether the slider moves steadily in the direction of the queue, number of that motion, the
-      !> speed for which limits are solved [m/s], and limits solved since it was set
+      !> Whether the slider moves steadily in the direction of the queue, number of that motion, and
+      !> the speed up to which limits are bounds [m/s]
       logical :: is_steady = .false.
-      real(wp) :: motion = 0.0_wp, speed = 0.0_wp
-      integer :: solved = 0
+      real(wp) :: motion = 0.0_wp, speed = huge(1.0_wp)
       !> Whether the last response left the law unchanged
       logical :: is_unchanged = .false.
       !> Contacts of the breaks in the schedule
@@ -97,7 +95,7 @@ module mesoslip_contacts_ageing_base
       procedure :: rebuild, behind_of, records, limit_at_birth
       procedure, non_overridable :: solve, solve_all, put, refresh, threshold, mean_of, ahead_of, &
          & behind_at
-      procedure, non_overridable :: is_due, record_lateness, count_visits
+      procedure, non_overridable :: is_due, is_falling, record_lateness, count_visits
    end type ageing_contacts_type
 
 contains
@@ -132,8 +130,7 @@ contains
       position = 0
    end function position_of
 
-   !> Solve the limit of a contact for the speed of the queue: exact in a steady motion, else a
-   !> lower bound.
+   !> Solve the limit of a contact: exact in a steady motion, else a lower bound at any speed.
    subroutine solve(self, contact, displacement, time)
       class(ageing_contacts_type), intent(inout) :: self
       integer, intent(in) :: contact
@@ -141,7 +138,6 @@ contains
 
       real(wp) :: age, stretch
 
-      self%solved = self%solved + 1
       associate (life => self%life(:, contact), limit => self%record(row_limit, contact))
          age = time - life(life_birth)
          if (self%ageing%is_old(age) .or. self%ageing%is_constant(life(life_limit), &
@@ -150,15 +146,17 @@ contains
             life(life_motion) = any_motion
             return
          end if
-         stretch = self%direction * (displacement - self%record(row_origin, contact))
          if (self%is_steady) then
+            stretch = self%direction * (displacement - self%record(row_origin, contact))
             life(life_motion) = self%motion
             limit = meet(self%ageing, life(life_limit), self%mean_of(contact), age, stretch, &
                & self%speed)
          else
             life(life_motion) = no_motion
-            limit = meet_bound(self%ageing, life(life_limit), self%mean_of(contact), age, &
-               & stretch, self%speed)
+            limit = life(life_limit)
+            if (.not. self%ageing%falls(limit, self%mean_of(contact))) then
+               call self%refresh(contact, time)
+            end if
          end if
       end associate
    end subroutine solve
@@ -178,7 +176,6 @@ contains
          if (self%life(life_motion, contact) >= any_motion) cycle
          call self%solve(contact, pose%displacement, pose%time)
       end do
-      self%solved = 0
       call self%rebuild(pose%displacement)
       call self%count_visits(self%parameters%count)
    end subroutine solve_all
@@ -298,6 +295,16 @@ contains
       is_due = gap <= 0.0_wp .or. (gap <= tiny_gap * self%stretch &
          & .and. self%life(life_motion, contact) < any_motion)
    end function is_due
+
+   !> Whether the threshold of a contact falls, and its limit is that when it is old.
+   pure function is_falling(self, contact)
+      class(ageing_contacts_type), intent(in) :: self
+      integer, intent(in) :: contact
+      logical :: is_falling
+
+      is_falling = self%life(life_motion, contact) < any_motion &
+         & .and. self%ageing%falls(self%life(life_limit, contact), self%mean_of(contact))
+   end function is_falling
 
    !> Record as an error of the force that a contact breaks too late.
    pure subroutine record_lateness(self, contact, pose)

@@ -1,39 +1,41 @@
 !> N independent contacts whose thresholds change with their age.
 !>
 !> A contact breaks at the first time at which its force equals its threshold, while both change.
-!> Contacts are queued by where that happens if the slider keeps a speed, which is solved once, at
-!> birth:
+!> Contacts are queued by bounds on where that happens:
 !>
-!> - In a steady motion they break there (mesoslip_contacts_ageing_steady).
-!> - Where the velocity changes, that speed is twice the slider's. A slower slider takes longer, and
-!>   a growing threshold is then higher, so that the queue has lower bounds
-!>   (mesoslip_contacts_ageing_motion). The first contacts of the queue are the leaders, whose
-!>   breaks are extrapolated from the motion of the slider (mesoslip_contacts_ageing_leaders).
-!> - Falling thresholds are bounded by their values at the end of a window
-!>   (mesoslip_contacts_ageing_falling).
+!> - In a steady motion it happens there, which is solved once, at birth
+!>   (mesoslip_contacts_ageing_steady).
+!> - Otherwise the bound of a growing threshold is its last value. The first contacts of the queue
+!>   are the leaders, whose breaks are extrapolated from the motion of the slider
+!>   (mesoslip_contacts_ageing_leaders). A schedule has the leaders.
+!> - The bound of a falling threshold is its value when it is old. A contact that has reached that
+!>   is kept apart (mesoslip_contacts_ageing_falling).
 !>
 !> A contact that does not age breaks as in the ensemble without ageing, to the bit.
 module mesoslip_contacts_ageing_contacts
-   use mesoslip_contacts_ageing_base, only: ageing_contacts_type, append, falling, in_falling, &
+   use mesoslip_contacts_ageing_base, only: ageing_contacts_type, any_motion, falling, in_falling, &
       & in_leaders, in_queue, leaders, life_birth, life_length, life_limit, life_motion, near, &
-      & next_length, next_speed, no_motion, position_of, remove
-   use mesoslip_contacts_ageing_falling, only: bound_falling, break_falling, scan, scan_if_needed
+      & next_configured, next_length, next_speed, no_motion, position_of, remove, &
+      & tiny_gap
+   use mesoslip_contacts_ageing_falling, only: add_falling, bound_falling, break_falling, scan, &
+      & scan_if_needed
    use mesoslip_contacts_ageing_law, only: take_ageing_law
    use mesoslip_contacts_ageing_leaders, only: add_leader, bound_leaders, break_leaders, &
-      & remove_leader
-   use mesoslip_contacts_ageing_motion, only: bound_speed, follow_motion, min_ratio
-   use mesoslip_contacts_ageing_steady, only: break_steady, end_steady, plan_steady, &
-      & queue_newborn, settle_steady
+      & gather_leaders, remove_leader, sort_leaders
+   use mesoslip_contacts_ageing_motion, only: follow_motion
+   use mesoslip_contacts_ageing_steady, only: break_steady, plan_steady, queue_newborn, &
+      & settle_steady
    use mesoslip_contacts_base, only: contact_parameters_type, contacts_type
    use mesoslip_contacts_individual_base, only: exchange_individual, total_law
    use mesoslip_contacts_individual_queue, only: new_contact_queue
-   use mesoslip_contacts_individual_record, only: row_limit, row_stiffness
+   use mesoslip_contacts_individual_births, only: drag_of
+   use mesoslip_contacts_individual_record, only: row_limit, row_origin, row_stiffness
    use mesoslip_interface_law, only: interface_law_type, pose_type, window_type
    use mesoslip_numerics_archive, only: archive_type
    use mesoslip_numerics_errors, only: error_type, raise, status_memory
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_numerics_parameters, only: parameters_type
-   use mesoslip_schedule, only: schedule_type
+   use mesoslip_schedule, only: max_events, schedule_type
    implicit none
    private
 
@@ -49,7 +51,8 @@ module mesoslip_contacts_ageing_contacts
    type, extends(ageing_contacts_type) :: contact_ageing_type
    contains
       procedure :: initialize, offer, respond, plan, settle, join, leave, shift_order, exchange
-      procedure, private, non_overridable :: break_due, assign, reverse
+      procedure, private, non_overridable :: break_due, reverse, plan_growing, settle_growing, &
+         & list_newborn
    end type contact_ageing_type
 
 contains
@@ -73,12 +76,10 @@ contains
       call parameters%finish(error)
       if (allocated(error)) return
       self%stretch = common%static_force / common%stiffness
-      self%speed = min_ratio * self%stretch / self%ageing%time
-      self%may_outrun = self%ageing%acts() .and. .not. self%jumps
-      if (self%jumps) self%speed = huge(1.0_wp)
       call self%allocate_records(0, 0, error)
       if (.not. allocated(error)) call self%births%record_factors(self%parameters, error)
       if (allocated(error)) return
+      self%lists_sites = .not. (allocated(self%births%force) .or. common%strength%is_used)
       associate (count => common%count)
          allocate (self%life(life_length, count), source=0.0_wp, stat=stat)
          if (stat == 0) allocate (self%next(next_length, count), source=0.0_wp, stat=stat)
@@ -113,9 +114,12 @@ contains
          if (.not. self%record(row_stiffness, contact) > 0.0_wp) cycle
          self%life(life_birth, contact) = -self%ageing%initial_age
          self%life(life_limit, contact) = self%record(row_limit, contact)
-         call self%assign(contact, 0.0_wp, 0.0_wp)
+         call self%solve(contact, 0.0_wp, 0.0_wp)
       end do
       call self%rebuild_queue(0.0_wp)
+      ! The slider is in balance under this law.
+      self%prediction%law = total_law(self)
+      self%prediction%offered = self%prediction%law
    end subroutine initialize
 
    subroutine offer(self, pose, law, window)
@@ -136,9 +140,8 @@ contains
       if (self%is_steady) then
          upper = self%queue%first_key
       else
-         if (self%may_outrun) call bound_speed(self, pose, end_time)
          call scan_if_needed(self, pose)
-         call bound_leaders(self, pose, end_time, upper)
+         call bound_leaders(self, pose, upper, end_time)
          call bound_falling(self, pose, upper, lower, end_time)
       end if
       window = self%window_between(lower, upper, end_time)
@@ -152,16 +155,13 @@ contains
       real(wp) :: breaks
 
       self%now = after%time
-      if (self%is_steady) then
-         self%prediction%jerk_error = 0.0_wp
-      else
-         call self%prediction%compare(before, after)
-      end if
+      call self%prediction%compare(before, after)
+      if (self%is_steady) self%prediction%jerk_error = 0.0_wp
       breaks = self%breaks
       self%is_unchanged = min(self%detached%next_due, self%sites%next_time) > after%time
       if (self%is_steady) then
          if (abs(after%velocity - before%velocity) + abs(after%acceleration) > 0.0_wp) then
-            call end_steady(self, after)
+            self%is_steady = .false.
          end if
       end if
       call self%break_due(after)
@@ -169,7 +169,6 @@ contains
       call self%attach_due(after)
    end subroutine respond
 
-   !> Only the steady motion of a slider without inertia has a schedule.
    subroutine plan(self, pose, limit, schedule)
       class(contact_ageing_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
@@ -177,13 +176,89 @@ contains
       type(schedule_type), intent(inout) :: schedule
 
       schedule%is_over = .true.
-      if (pose%inverse_mass > 0.0_wp .or. pose%direction * self%direction < 0.0_wp) return
+      if (self%jumps .or. pose%direction * self%direction < 0.0_wp) return
       ! Limits are solved before it is known where contacts attach, and under one force.
       if (self%parameters%strength%is_used .or. self%parameters%keeps_thresholds) return
       self%cost = 1.0_wp
       call follow_motion(self, pose)
-      if (self%is_steady) call plan_steady(self, pose, limit, schedule)
+      schedule%has_growth = .not. self%is_steady
+      if (self%is_steady) then
+         call plan_steady(self, pose, limit, schedule)
+      else if (pose%is_known .and. self%list(falling)%count == 0) then
+         call self%plan_growing(pose, limit, schedule)
+      end if
    end subroutine plan
+
+   !> Write a schedule of the leaders and about as many attachments.
+   subroutine plan_growing(self, pose, limit, schedule)
+      class(contact_ageing_type), intent(inout) :: self
+      type(pose_type), intent(in) :: pose
+      integer, intent(in) :: limit
+      type(schedule_type), intent(inout) :: schedule
+
+      integer :: number, event, contact(max_events)
+
+      call gather_leaders(self, pose)
+      self%cost = 1.0_wp
+      schedule%unlisted = self%queue%first_key
+      associate (list => self%list(leaders))
+         do event = 1, min(limit, max_events, list%count)
+            associate (one => list%contact(list%count + 1 - event))
+               if (self%is_falling(one) &
+                  & .or. self%leader_key(list%count + 1 - event) >= schedule%unlisted) exit
+               self%listed(event) = one
+               schedule%break_entry(event) = event
+               schedule%break_coordinate(event) = self%leader_key(list%count + 1 - event)
+               schedule%break_origin(event) = self%record(row_origin, one)
+               schedule%entry_is_constant(event) = self%life(life_motion, one) >= any_motion
+               schedule%entry_limit(event) = self%record(row_limit, one)
+               schedule%entry_configured(event) = self%life(life_limit, one)
+               schedule%entry_mean(event) = self%mean_of(one)
+               schedule%entry_birth(event) = self%life(life_birth, one)
+            end associate
+         end do
+         number = event - 1
+         if (number < list%count) then
+            schedule%unlisted = min(schedule%unlisted, self%leader_key(list%count - number))
+         end if
+      end associate
+      if (number == 0) return
+      schedule%break_stiffness(:number) = self%parameters%stiffness
+      schedule%break_drag(:number) = drag_of(self%parameters, self%parameters%stiffness)
+      schedule%breaks = number
+      schedule%written = number
+      schedule%broken = 0
+      schedule%moments = 0
+      schedule%lateness = 0.0_wp
+      schedule%direction = self%direction
+      schedule%behind = self%behind
+      schedule%ageing = self%ageing
+      schedule%prediction = self%prediction
+      schedule%resolution = tiny_gap * self%stretch
+      call self%list_attachments(min(limit, max_events, number + 4), pose%direction, schedule, &
+         & contact)
+      call self%list_newborn(contact(:schedule%attachments), schedule%attach_limit)
+      call self%list_births(self%listed(:number), 0, pose%direction, schedule)
+      if (schedule%has_births) then
+         call self%list_newborn(self%listed(:number), schedule%birth_limit)
+      end if
+      call self%list_sites(min(limit, max_events), self%listed(:number), schedule)
+      schedule%is_over = .false.
+   end subroutine plan_growing
+
+   !> Replace the configured breaking stretches of contacts in their next life by bounds [m].
+   subroutine list_newborn(self, contact, limit)
+      class(contact_ageing_type), intent(inout) :: self
+      integer, intent(in) :: contact(:)
+      real(wp), intent(inout) :: limit(:)
+
+      integer :: event
+
+      do event = 1, size(contact)
+         self%next(next_configured, contact(event)) = limit(event)
+         limit(event) = self%limit_at_birth(limit(event))
+      end do
+   end subroutine list_newborn
 
    subroutine settle(self, schedule, pose)
       class(contact_ageing_type), intent(inout) :: self
@@ -191,12 +266,57 @@ contains
       type(pose_type), intent(in) :: pose
 
       self%now = pose%time
-      self%prediction%jerk_error = 0.0_wp
-      call settle_steady(self, schedule)
+      if (schedule%has_growth) then
+         call self%settle_growing(schedule)
+      else
+         self%prediction%jerk_error = 0.0_wp
+         call settle_steady(self, schedule)
+      end if
+      call self%move_listed(schedule, pose)
       ! A contact that has just broken and attaches at once was not in the schedule.
       if (schedule%is_over) call self%attach_due(pose)
       self%detached_count = real(self%detached%count, wp)
    end subroutine settle
+
+   !> Update the contacts after a schedule of leaders.
+   subroutine settle_growing(self, schedule)
+      class(contact_ageing_type), intent(inout) :: self
+      type(schedule_type), intent(in) :: schedule
+
+      integer :: event, first, contact(max_events)
+
+      self%prediction = schedule%prediction
+      self%error_estimate = max(self%error_estimate, merge(schedule%lateness, 0.0_wp, &
+         & schedule%lateness > schedule%resolution) * self%parameters%stiffness)
+      call self%detach_listed(self%listed(schedule%break_entry(:schedule%broken)), schedule)
+      self%kept(self%listed(schedule%break_entry(:schedule%broken))) = in_queue
+      associate (list => self%list(leaders))
+         ! Those that were listed are the last ones.
+         first = list%count - schedule%written
+         do event = schedule%broken + 1, schedule%written
+            associate (entry => schedule%break_entry(event), &
+               & position => first + 1 + schedule%written - event)
+               list%contact(position) = self%listed(entry)
+               self%leader_key(position) = schedule%break_coordinate(event)
+               self%record(row_limit, self%listed(entry)) = schedule%entry_limit(entry)
+            end associate
+         end do
+         list%count = list%count - schedule%broken
+      end associate
+      call sort_leaders(self, first + 1)
+      call self%attach_listed(schedule, contact)
+      do event = 1, schedule%attached
+         associate (one => contact(event), birth => schedule%attach_time(event))
+            self%life(:, one) = [birth, self%next(next_configured, one), no_motion]
+            if (self%ageing%is_constant(self%life(life_limit, one), self%stretch)) then
+               self%life(life_motion, one) = any_motion
+            end if
+            self%next(next_speed, one) = 0.0_wp
+            call self%put(one)
+         end associate
+      end do
+      self%behind = schedule%behind
+   end subroutine settle_growing
 
    !> Break all contacts that are due.
    subroutine break_due(self, pose)
@@ -217,10 +337,13 @@ contains
       if (self%is_steady) then
          call break_steady(self, pose)
       else
-         call break_falling(self, pose)
          call break_leaders(self, pose)
          do while (self%queue%first_key <= self%direction * pose%displacement)
             call self%queue%pop(self%record, contact)
+            if (self%is_falling(contact)) then
+               call add_falling(self, contact)
+               cycle
+            end if
             call self%refresh(contact, pose%time)
             if (self%is_due(contact, pose)) then
                call self%record_lateness(contact, pose)
@@ -229,11 +352,12 @@ contains
                call add_leader(self, contact)
             end if
          end do
+         call break_falling(self, pose)
       end if
       if (self%breaks > breaks) self%track%generation = self%track%generation + 1
    end subroutine break_due
 
-   !> Begin the life of a contact that has attached, and queue it unless its threshold falls.
+   !> Begin the life of a contact that has attached, and queue it.
    subroutine join(self, contact, pose)
       class(contact_ageing_type), intent(inout) :: self
       integer, intent(in) :: contact
@@ -250,12 +374,10 @@ contains
          call queue_newborn(self, contact)
       else
          self%next(next_speed, contact) = 0.0_wp
-         call self%assign(contact, pose%displacement, pose%time)
+         call self%solve(contact, pose%displacement, pose%time)
       end if
-      if (self%kept(contact) == in_queue) then
-         call self%put(contact)
-         self%behind = max(self%behind, self%behind_at(contact, pose%time))
-      end if
+      call self%put(contact)
+      self%behind = max(self%behind, self%behind_at(contact, pose%time))
    end subroutine join
 
    subroutine leave(self, contact)
@@ -277,31 +399,13 @@ contains
       self%kept(contact) = in_queue
    end subroutine leave
 
-   !> Find where a contact is kept at the beginning of its life in a motion that is not steady.
-   subroutine assign(self, contact, displacement, time)
-      class(contact_ageing_type), intent(inout) :: self
-      integer, intent(in) :: contact
-      real(wp), intent(in) :: displacement, time
-
-      if (self%ageing%falls(self%life(life_limit, contact), self%mean_of(contact)) &
-         & .and. .not. self%ageing%is_old(time - self%life(life_birth, contact))) then
-         self%kept(contact) = in_falling
-         call append(self%list(falling), contact)
-         call append(self%list(near), contact)
-         call self%refresh(contact, self%scan_time)
-         self%life(life_motion, contact) = no_motion
-      else
-         self%kept(contact) = in_queue
-         call self%solve(contact, displacement, time)
-      end if
-   end subroutine assign
-
    !> Reverse the direction of motion for which the queue is kept.
    subroutine reverse(self, pose)
       class(contact_ageing_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
 
-      if (self%is_steady) call end_steady(self, pose)
+      self%is_steady = .false.
+      self%speed = huge(1.0_wp)
       self%direction = -self%direction
       if (self%list(falling)%count > 0) call scan(self, pose)
       call self%solve_all(pose)
@@ -343,7 +447,6 @@ contains
       call archive%exchange("is_steady", self%is_steady)
       call archive%exchange("motion", self%motion)
       call archive%exchange("speed", self%speed)
-      call archive%exchange("solved", self%solved)
    end subroutine exchange
 
 end module mesoslip_contacts_ageing_contacts

@@ -1,18 +1,20 @@
 !> Contacts whose thresholds fall with age.
 !>
-!> Such a contact may break while the slider rests, and in either direction of motion. Until the end
-!> of a window its threshold is bounded by the value at that end. Usually few thresholds fall; among
-!> many, only those contacts are looked at that are near: they may break before the next scan.
+!> Such a contact may break while the slider rests, and in either direction of motion, once its
+!> stretch has reached its threshold when it is old. From then on its threshold is bounded until the
+!> end of a window by the value at that end. Usually few thresholds fall; among many, only those
+!> contacts are looked at that are near: they may break before the next scan.
 module mesoslip_contacts_ageing_falling
    use mesoslip_contacts_ageing_base, only: ageing_contacts_type, any_motion, append, falling, &
-      & in_queue, life_birth, life_limit, life_motion, near, position_of, remove, tiny_gap
+      & in_falling, in_queue, life_birth, life_limit, life_motion, near, position_of, remove, &
+      & tiny_gap
    use mesoslip_contacts_individual_record, only: row_limit, row_origin, behind_coordinate
    use mesoslip_interface_law, only: pose_type
    use mesoslip_numerics_kinds, only: wp
    implicit none
    private
 
-   public :: scan, scan_if_needed, bound_falling, break_falling
+   public :: scan, scan_if_needed, bound_falling, break_falling, add_falling
 
    !> Number of contacts up to which all are near, without a scan
    integer, parameter :: max_unscanned = 32
@@ -60,6 +62,18 @@ contains
       end do
       call self%count_visits(2 * self%list(falling)%count)
    end subroutine scan
+
+   !> Add a contact whose stretch has reached its threshold when it is old: until then it could not
+   !> break.
+   subroutine add_falling(self, contact)
+      class(ageing_contacts_type), intent(inout) :: self
+      integer, intent(in) :: contact
+
+      self%kept(contact) = in_falling
+      call append(self%list(falling), contact)
+      call append(self%list(near), contact)
+      call self%refresh(contact, self%scan_time)
+   end subroutine add_falling
 
    !> Let all contacts be near, everywhere and always.
    pure subroutine clear_scan(self)
@@ -162,8 +176,10 @@ contains
          end if
          if (.not. step < max_step) exit
       end do
-      ! A slider that jumps approaches at a fixed time: half of the gap is for that.
-      if (self%jumps .and. .not. speed > 0.0_wp) step = 0.5_wp * step
+      ! A slider that jumps approaches at a fixed time, and one that turns slowly at first: half of the
+      ! gap is for that.
+      if (speed < abs(self%prediction%acceleration) * step &
+         & .or. (self%jumps .and. .not. speed > 0.0_wp)) step = 0.5_wp * step
       if (step < max_step) end_time = max(pose%time + step, nearest(pose%time, 1.0_wp))
       limit = max(stretch, self%threshold(contact, end_time))
       upper = min(upper, self%direction * self%record(row_origin, contact) + limit)

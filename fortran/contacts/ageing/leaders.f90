@@ -2,51 +2,53 @@
 !>
 !> The breaks of leaders are extrapolated from the motion of the slider, with a margin: its
 !> acceleration and jerk follow from the law that it is offered
-!> (mesoslip_contacts_ageing_prediction). A slider that arrives where a leader was expected to break
+!> (mesoslip_motion_prediction). A slider that arrives where a leader was expected to break
 !> finds it due, or a little ahead; then its break is extrapolated again.
 module mesoslip_contacts_ageing_leaders
    use mesoslip_contacts_ageing_base, only: ageing_contacts_type, any_motion, append, in_leaders, &
       & in_queue, leaders, life_birth, life_limit, life_motion, tiny_gap
+   use mesoslip_contacts_ageing_falling, only: add_falling
    use mesoslip_contacts_individual_sorting, only: before
-   use mesoslip_contacts_individual_record, only: row_origin
+   use mesoslip_contacts_individual_record, only: row_limit, row_origin
    use mesoslip_interface_law, only: pose_type
    use mesoslip_numerics_kinds, only: wp
+   use mesoslip_schedule, only: max_events
    implicit none
    private
 
-   public :: bound_leaders, break_leaders, add_leader, remove_leader
+   public :: bound_leaders, break_leaders, gather_leaders, sort_leaders, add_leader, remove_leader
 
    !> Contacts that are taken out of the queue together
    integer, parameter :: max_gathered = 16
-   !> Leaders that are extrapolated at once: extrapolating more costs more than a stop at the bound
-   !> of the next
-   integer, parameter :: max_extrapolated = 4
+   !> Leaders before the queue that are enough for a schedule
+   integer, parameter :: enough = max_events - max_gathered
 
 contains
 
    !> Bound a window by the breaks of the leaders and of the queue.
-   subroutine bound_leaders(self, pose, end_time, upper)
+   subroutine bound_leaders(self, pose, upper, end_time)
       class(ageing_contacts_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
-      !> Latest end of the window [s]
-      real(wp), intent(in) :: end_time
-      !> Coordinate before which no contact breaks [m]
-      real(wp), intent(inout) :: upper
+      !> Coordinate before which no contact breaks [m], until a time [s]
+      real(wp), intent(inout) :: upper, end_time
 
       real(wp) :: reach
 
       reach = huge(1.0_wp)
-      if (.not. self%jumps) reach = self%prediction%reach(pose, self%direction, end_time)
-      call extrapolate_first(self, pose, reach, upper)
-      if (self%queue%first_key < min(upper, reach)) then
-         call gather(self, pose)
-         call extrapolate_first(self, pose, reach, upper)
+      if (.not. self%jumps) then
+         call self%prediction%limit_time(pose, end_time)
+         reach = self%prediction%reach(pose, self%direction, end_time)
       end if
+      do
+         call extrapolate_first(self, pose, reach, upper)
+         if (.not. self%queue%first_key < min(upper, reach)) exit
+         call gather(self, pose)
+      end do
       upper = min(upper, self%queue%first_key)
    end subroutine bound_leaders
 
-   !> Extrapolate the breaks of the first leaders, as many as may break next. Limits other than that
-   !> of the first are solved again before, which makes the bounds closer.
+   !> Extrapolate the breaks of the leaders that may break next. The same rule as look_ahead of a
+   !> schedule, so that results agree to the bit.
    subroutine extrapolate_first(self, pose, reach, upper)
       class(ageing_contacts_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
@@ -55,41 +57,61 @@ contains
       !> Coordinate before which no leader breaks [m]
       real(wp), intent(inout) :: upper
 
-      integer :: position, first, contact
-      real(wp) :: key
+      integer :: position, contact
+      real(wp) :: meeting
 
-      first = self%list(leaders)%count
-      do position = first, 1, -1
-         key = self%leader_key(position)
-         if (.not. key < upper) exit
-         if (first - position == max_extrapolated) then
-            upper = key
+      do position = self%list(leaders)%count, 1, -1
+         if (.not. self%leader_key(position) < min(upper, reach)) then
+            upper = min(upper, self%leader_key(position))
             exit
          end if
-         if (key < reach) then
-            contact = self%list(leaders)%contact(position)
-            if (position < first .and. self%life(life_motion, contact) < any_motion) then
-               call self%solve(contact, pose%displacement, pose%time)
-               key = self%ahead_of(contact)
-               self%leader_key(position) = key
-            end if
-            if (key < upper) key = extrapolated_break(self, contact, pose)
+         contact = self%list(leaders)%contact(position)
+         if (self%is_falling(contact)) then
+            call remove_leader(self, position)
+            call add_falling(self, contact)
+            cycle
          end if
-         upper = min(upper, key)
+         call extrapolate(self, contact, pose, meeting)
+         self%leader_key(position) = self%ahead_of(contact)
+         upper = min(upper, meeting)
       end do
-      call self%count_visits(first - position)
-      do position = position + 1, first
-         call sort_leader(self, position)
-      end do
+      call self%count_visits(self%list(leaders)%count - position)
+      call sort_leaders(self, position + 1)
    end subroutine extrapolate_first
 
-   !> Make leaders of the first contacts of the queue. Their limits are solved again from the
-   !> present time on, which makes the bounds closer than those from birth.
+   !> Make leaders of the first contacts of the queue, for a schedule.
+   subroutine gather_leaders(self, pose)
+      class(ageing_contacts_type), intent(inout) :: self
+      type(pose_type), intent(in) :: pose
+
+      integer :: surplus, position
+
+      surplus = self%list(leaders)%count - 2 * max_events
+      if (surplus > 0) then
+         do position = 1, surplus
+            call self%put(self%list(leaders)%contact(position))
+         end do
+         self%list(leaders)%contact(:2 * max_events) = &
+            & self%list(leaders)%contact(surplus + 1:surplus + 2 * max_events)
+         self%leader_key(:2 * max_events) = self%leader_key(surplus + 1:surplus + 2 * max_events)
+         self%list(leaders)%count = 2 * max_events
+      end if
+      do while (self%queue%first_key < huge(1.0_wp))
+         associate (count => self%list(leaders)%count)
+            if (count >= enough) then
+               if (self%leader_key(count - enough + 1) < self%queue%first_key) exit
+            end if
+         end associate
+         call gather(self, pose)
+      end do
+   end subroutine gather_leaders
+
+   !> Make leaders of the first contacts of the queue, with their present thresholds as limits.
    subroutine gather(self, pose)
       class(ageing_contacts_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
 
-      integer :: number, position, contact(max_gathered)
+      integer :: number, added, position, contact(max_gathered)
       real(wp) :: last
 
       last = self%queue%first_key + max_gathered * self%stretch / self%parameters%count
@@ -98,17 +120,31 @@ contains
          call self%queue%pop(self%record, contact(number))
       end do
       number = number - 1
+      call self%count_visits(number)
+      added = 0
       do position = 1, number
          if (self%life(life_motion, contact(position)) < any_motion) then
             call self%solve(contact(position), pose%displacement, pose%time)
          end if
          if (self%ahead_of(contact(position)) <= last) then
-            call add_leader(self, contact(position))
+            added = added + 1
+            contact(added) = contact(position)
          else
             call self%put(contact(position))
          end if
       end do
-      call self%count_visits(number)
+      ! Most are beyond all leaders.
+      associate (list => self%list(leaders))
+         list%contact(added + 1:added + list%count) = list%contact(:list%count)
+         self%leader_key(added + 1:added + list%count) = self%leader_key(:list%count)
+         list%count = added + list%count
+         do position = 1, added
+            list%contact(added + 1 - position) = contact(position)
+            self%leader_key(added + 1 - position) = self%ahead_of(contact(position))
+            self%kept(contact(position)) = in_leaders
+         end do
+      end associate
+      call sort_leaders(self, 2)
    end subroutine gather
 
    !> Add a contact to the leaders, which are in decreasing order of their keys.
@@ -121,6 +157,18 @@ contains
       self%leader_key(self%list(leaders)%count) = self%ahead_of(contact)
       call sort_leader(self, self%list(leaders)%count)
    end subroutine add_leader
+
+   !> Sort the leaders from a position on, whose keys have grown.
+   subroutine sort_leaders(self, first)
+      class(ageing_contacts_type), intent(inout) :: self
+      integer, intent(in) :: first
+
+      integer :: position
+
+      do position = first, self%list(leaders)%count
+         call sort_leader(self, position)
+      end do
+   end subroutine sort_leaders
 
    !> Move a leader back to its place by its key; those before it are sorted.
    subroutine sort_leader(self, first)
@@ -143,28 +191,23 @@ contains
       end associate
    end subroutine sort_leader
 
-   !> Coordinate at which a leader breaks by extrapolation, not beyond where it does break.
-   pure function extrapolated_break(self, contact, pose) result(coordinate)
-      class(ageing_contacts_type), intent(in) :: self
+   !> Set the limit of a leader to its present threshold, and find where the slider meets that, or
+   !> before.
+   subroutine extrapolate(self, contact, pose, meeting)
+      class(ageing_contacts_type), intent(inout) :: self
       integer, intent(in) :: contact
       type(pose_type), intent(in) :: pose
-      real(wp) :: coordinate
+      !> The coordinate [m]
+      real(wp), intent(out) :: meeting
 
-      real(wp) :: age, limit, rate, here, growth
-      logical :: is_known
-
-      coordinate = self%ahead_of(contact)
+      meeting = self%ahead_of(contact)
       if (self%life(life_motion, contact) >= any_motion) return
-      if (self%jumps .and. .not. self%is_unchanged) return
-      age = pose%time - self%life(life_birth, contact)
-      call self%ageing%evaluate(self%life(life_limit, contact), self%mean_of(contact), age, limit, &
-         & rate)
-      here = self%direction * self%record(row_origin, contact) + limit
-      call self%prediction%extrapolate(self%ageing, rate, age, &
-         & here - self%direction * pose%displacement, self%direction * pose%velocity, &
-         & self%direction, tiny_gap * self%stretch, growth, is_known)
-      if (is_known) coordinate = max(coordinate, here + growth)
-   end function extrapolated_break
+      call self%prediction%meet(self%ageing, self%life(life_limit, contact), &
+         & self%mean_of(contact), pose%time - self%life(life_birth, contact), &
+         & self%direction * self%record(row_origin, contact), pose, self%direction, &
+         & tiny_gap * self%stretch, self%record(row_limit, contact), meeting)
+      if (self%jumps .and. .not. self%is_unchanged) meeting = self%ahead_of(contact)
+   end subroutine extrapolate
 
    !> Break the leaders that are due, in the order of their keys.
    subroutine break_leaders(self, pose)
@@ -178,16 +221,19 @@ contains
       do position = self%list(leaders)%count, 1, -1
          if (.not. self%leader_key(position) < reached) exit
          contact = self%list(leaders)%contact(position)
-         call self%refresh(contact, pose%time)
-         self%leader_key(position) = self%ahead_of(contact)
+         if (self%is_falling(contact)) then
+            call remove_leader(self, position)
+            call add_falling(self, contact)
+         else
+            call self%refresh(contact, pose%time)
+            self%leader_key(position) = self%ahead_of(contact)
+         end if
       end do
-      do position = position + 1, self%list(leaders)%count
-         call sort_leader(self, position)
-      end do
+      call sort_leaders(self, position + 1)
       do position = self%list(leaders)%count, 1, -1
          if (.not. self%leader_key(position) < reached) exit
          contact = self%list(leaders)%contact(position)
-         if (.not. self%is_due(contact, pose)) cycle
+         if (.not. self%is_due(contact, pose)) exit
          call self%record_lateness(contact, pose)
          call remove_leader(self, position)
          self%kept(contact) = in_queue

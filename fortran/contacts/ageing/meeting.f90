@@ -9,7 +9,7 @@ module mesoslip_contacts_ageing_meeting
    implicit none
    private
 
-   public :: meet, meet_bound, meet_newborn
+   public :: meet, meet_newborn
 
    !> Coefficients of exp(T(p)), where T = p exp(T) < 1, in powers of (1 - e p)^(1/2), in which it
    !> is analytic; exact to 5e-5
@@ -22,11 +22,6 @@ module mesoslip_contacts_ageing_meeting
    real(wp), parameter :: max_step = 1.0e-4_wp
    !> Rate over speed up to which one such step is enough
    real(wp), parameter :: max_plain = 0.9_wp
-   !> Relative change of the rate of a threshold up to which a parabola is a close bound
-   real(wp), parameter :: max_bend = 0.2_wp
-   !> Age at which a contact breaks, over its threshold's growth, from which the first steps of an
-   !> iteration are a close bound on it
-   real(wp), parameter :: min_far = 10.0_wp
    !> Relative size of a step of Newton's method after which the error is below rounding
    real(wp), parameter :: max_newton_step = 1.0e-8_wp
    !> Maximum number of steps, which is reached only where a contact just does not break
@@ -69,32 +64,6 @@ contains
          threshold = configured - deficit * exp(-fallen(distance, deficit / scale))
       end if
    end function meet
-
-   !> A lower bound on that threshold, which is found faster where it is near and grows.
-   pure function meet_bound(law, configured, mean, age, stretch, speed) result(threshold)
-      type(ageing_law_type), intent(in) :: law
-      real(wp), intent(in) :: configured, mean, age, stretch, speed
-      real(wp) :: threshold
-
-      real(wp) :: rate, bend, gap, time, slowness
-
-      call law%evaluate(configured, mean, age, threshold, rate)
-      gap = threshold - stretch
-      if (.not. (gap > 0.0_wp .and. rate > 0.0_wp) .or. speed * law%time > max_scale) return
-      bend = 0.5_wp * law%curvature(rate, age)
-      if (2.0_wp * gap * abs(bend) < max_bend * rate * speed .and. 2.0_wp * rate < speed) then
-         ! The third derivatives of thresholds are positive: a parabola is a lower bound.
-         slowness = 1.0_wp / speed
-         time = gap * slowness
-         time = (gap + (rate + bend * time) * time) * slowness
-         threshold = threshold + (rate + bend * time) * time
-      else if (law%kind == ageing_log) then
-         threshold = max(threshold, meet_early(law, configured, age / law%time, stretch, &
-            & speed * law%time))
-      else
-         threshold = meet(law, configured, mean, age, stretch, speed)
-      end if
-   end function meet_bound
 
    !> The same as meet, to the bit, for many contacts at birth, which is faster together.
    pure subroutine meet_newborn(law, configured, mean, stretch, speed, threshold)
@@ -199,25 +168,6 @@ contains
          if (abs(step) <= max_newton_step * max(1.0_wp, w)) return
       end do
    end function fallen
-
-   !> A lower bound on the threshold at which a contact breaks by the law `log`, as meet_grown finds
-   !> it: two steps of the iteration z = wanted + kappa ln z from z = 1, which approaches the
-   !> greater solution from below if `wanted` is at least 1.
-   pure function meet_early(law, configured, age, stretch, scale) result(threshold)
-      type(ageing_law_type), intent(in) :: law
-      real(wp), intent(in) :: configured, age, stretch, scale
-      real(wp) :: threshold
-
-      real(wp) :: kappa, wanted
-
-      kappa = configured * law%growth / scale
-      wanted = (configured - stretch) / scale + 1.0_wp + age
-      if (wanted > max(1.0_wp, min_far * kappa)) then
-         threshold = configured * (1.0_wp + law%growth * log(wanted + kappa * log(wanted)))
-      else
-         threshold = meet_grown(law, configured, age, stretch, scale)
-      end if
-   end function meet_early
 
    !> The same as meet for the law `log`.
    !>

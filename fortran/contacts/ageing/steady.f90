@@ -3,10 +3,9 @@
 !> They are queued by where they break if the motion continues, whether their thresholds grow or
 !> fall. That is solved once, at birth, or before it for several contacts together.
 module mesoslip_contacts_ageing_steady
-   use mesoslip_contacts_ageing_base, only: ageing_contacts_type, any_motion, append, falling, &
-      & in_falling, in_queue, leaders, life_birth, life_limit, life_motion, next_configured, &
-      & next_limit, next_speed, solved_together
-   use mesoslip_contacts_ageing_falling, only: scan
+   use mesoslip_contacts_ageing_base, only: ageing_contacts_type, any_motion, falling, in_queue, &
+      & life_birth, life_limit, life_motion, next_configured, next_limit, next_speed, &
+      & solved_together
    use mesoslip_contacts_ageing_meeting, only: meet, meet_newborn
    use mesoslip_contacts_individual_births, only: drag_of
    use mesoslip_contacts_individual_record, only: row_limit, row_next, row_origin, row_stiffness
@@ -16,7 +15,7 @@ module mesoslip_contacts_ageing_steady
    implicit none
    private
 
-   public :: begin_steady, end_steady, break_steady, queue_newborn, plan_steady, settle_steady
+   public :: begin_steady, break_steady, queue_newborn, plan_steady, settle_steady
 
 contains
 
@@ -25,48 +24,29 @@ contains
       class(ageing_contacts_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
 
-      integer :: number, position
+      integer :: contact
 
       self%is_steady = .true.
       self%motion = self%motion + 1.0_wp
-      if (abs(pose%velocity) > self%speed) then
+      if (abs(pose%velocity) > self%speed .or. .not. self%speed < huge(1.0_wp)) then
          self%speed = abs(pose%velocity)
          call self%solve_all(pose)
       else
+         ! A slower slider meets thresholds that fall earlier.
          self%speed = abs(pose%velocity)
-         do number = leaders, falling
-            do position = 1, self%list(number)%count
-               associate (contact => self%list(number)%contact(position))
-                  call self%solve(contact, pose%displacement, pose%time)
-                  call self%put(contact)
-               end associate
-            end do
+         do contact = 1, self%parameters%count
+            if (.not. self%record(row_stiffness, contact) > 0.0_wp) cycle
+            if (self%kept(contact) == in_queue) then
+               if (.not. self%is_falling(contact)) cycle
+               call self%queue%remove(self%record, contact)
+            end if
+            call self%solve(contact, pose%displacement, pose%time)
+            call self%put(contact)
          end do
       end if
       if (self%list(falling)%count > 0) self%behind = self%max_behind()
       self%list%count = 0
    end subroutine begin_steady
-
-   !> Take contacts with falling thresholds out of the queue: otherwise they may break earlier.
-   subroutine end_steady(self, pose)
-      class(ageing_contacts_type), intent(inout) :: self
-      type(pose_type), intent(in) :: pose
-
-      integer :: contact
-
-      self%is_steady = .false.
-      do contact = 1, self%parameters%count
-         if (.not. self%record(row_stiffness, contact) > 0.0_wp) cycle
-         if (self%life(life_motion, contact) >= any_motion) cycle
-         if (.not. self%ageing%falls(self%life(life_limit, contact), self%mean_of(contact))) cycle
-         call append(self%list(falling), contact)
-         self%kept(contact) = in_falling
-      end do
-      if (self%list(falling)%count == 0) return
-      call self%queue%clear(self%direction, self%direction * pose%displacement)
-      call scan(self, pose)
-      call self%rebuild(pose%displacement)
-   end subroutine end_steady
 
    !> Break the contacts that are due; those queued for a faster motion are solved again before.
    subroutine break_steady(self, pose)
@@ -132,7 +112,6 @@ contains
       class(ageing_contacts_type), intent(inout) :: self
       integer, intent(in) :: contact
 
-      self%solved = self%solved + 1
       ! With a track, limits depend on where contacts attach.
       if (self%parameters%strength%is_used .or. self%parameters%keeps_thresholds) return
       self%unsolved_count = self%unsolved_count + 1
@@ -201,6 +180,7 @@ contains
       call solve_listed(self, contact(:schedule%attachments), schedule%attach_limit)
       call self%list_births(self%listed(:number), 0, pose%direction, schedule)
       if (schedule%has_births) call solve_listed(self, self%listed(:number), schedule%birth_limit)
+      call self%list_sites(min(limit, max_events), self%listed(:number), schedule)
       schedule%is_over = .false.
    end subroutine plan_steady
 

@@ -63,6 +63,8 @@ module mesoslip_contacts_individual_base
       !> Whether sites that touch or separate are listed in schedules, and those sites
       logical :: lists_sites = .false.
       integer, private :: site_listed(max_events) = 0
+      !> Configured breaking stretches of the contacts that touch [m]
+      real(wp), private :: site_limit(max_events) = 0.0_wp
       !> Maximum number of those sites, by how many moved in the last schedule
       integer, private :: max_sites = max_events
    contains
@@ -457,7 +459,8 @@ contains
             if (schedule%site_touches(event)) then
                call self%draw_births([contact])
                call bear(self%parameters, self%record(row_next, contact), &
-                  & schedule%site_stiffness(event), schedule%site_limit(event))
+                  & schedule%site_stiffness(event), self%site_limit(event))
+               schedule%site_limit(event) = self%limit_at_birth(self%site_limit(event))
             else
                schedule%site_stiffness(event) = self%record(row_stiffness, contact)
                schedule%site_origin(event) = self%record(row_origin, contact)
@@ -696,17 +699,21 @@ contains
       type(schedule_type), intent(in) :: schedule
       type(pose_type), intent(in) :: pose
 
+      type(pose_type) :: touching
       integer :: event
 
+      touching = pose
       do event = 1, schedule%moved
          associate (contact => self%site_listed(event), stiffness => schedule%site_stiffness(event))
             if (schedule%site_touches(event)) then
                self%record(row_origin, contact) = schedule%site_displacement(event)
                self%record(row_stiffness, contact) = stiffness
-               self%record(row_limit, contact) = schedule%site_limit(event)
+               self%record(row_limit, contact) = self%site_limit(event)
                call self%births%request(contact, self%parameters, self%record)
                self%touches = .true.
-               call self%join(contact, pose)
+               touching%time = schedule%site_time(event)
+               touching%displacement = schedule%site_displacement(event)
+               call self%join(contact, touching)
                self%touches = .false.
             else
                call self%leave(contact)

@@ -9,7 +9,7 @@
 !>
 !> A contact breaks where the slider meets its threshold, too. The first of those that grow, the
 !> leaders, are extrapolated from the motion of the slider, as of contacts without temperature
-!> (mesoslip_contacts_ageing_prediction); the others are ordered by a bound, their thresholds when
+!> (mesoslip_motion_prediction); the others are ordered by a bound, their thresholds when
 !> they were looked at last.
 !>
 !> In a uniform prescribed motion all this is done at birth, as the time at which a contact has a
@@ -17,7 +17,7 @@
 !> hazard from then on does not depend on the one before.
 module mesoslip_contacts_thermal_ageing
    use mesoslip_contacts_ageing_law, only: ageing_law_type, take_ageing_law
-   use mesoslip_contacts_ageing_prediction, only: prediction_type
+   use mesoslip_motion_prediction, only: prediction_type
    use mesoslip_contacts_base, only: contact_parameters_type, contacts_type
    use mesoslip_contacts_individual_break_tree, only: break_tree_type, new_break_tree
    use mesoslip_contacts_individual_sorting, only: before

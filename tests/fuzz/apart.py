@@ -24,6 +24,11 @@ MEMORY = 6 * 2**30
 ESCAPED = 255
 
 
+def patience(seconds: float) -> float:
+    """The time in which a process has come as far as in some seconds alone on the machine [s]."""
+    return seconds * max(1.0, os.getloadavg()[0] / (os.cpu_count() or 1))
+
+
 @dataclass(eq=False)
 class Apart:
     """A function at work in another process.
@@ -33,7 +38,7 @@ class Apart:
     function
         What is called there; its result comes back if it can be pickled.
     seconds
-        Time that it has.
+        Time that it has, more where others share the processors.
     log
         File that takes what is written to its standard streams.
     """
@@ -46,7 +51,7 @@ class Apart:
         self._pipe, far = os.pipe()
         sys.stdout.flush()
         sys.stderr.flush()
-        self.deadline = time.monotonic() + self.seconds
+        self.deadline = time.monotonic() + patience(self.seconds)
         self.pid = os.fork()
         if self.pid == 0:
             self._child(far)

@@ -25,7 +25,7 @@ import netCDF4
 import numpy as np
 import tomli_w
 import xarray as xr
-from apart import Command, Told, call, limit_memory
+from apart import Command, Told, call, limit_memory, patience
 from configurations import draw, mutate, text
 from conftest import klein_tables
 from invariants import broken, differences, energy_residual, left_over, promised_residual
@@ -396,7 +396,7 @@ def checkpoints(name: str, folder: Path) -> Report:
             path.write_bytes(damaged(data, random))
         if not any(place.iterdir()):
             break
-    printed = call(["run", case, "-o", output, "--resume"], folder, 20.0)
+    printed = call(["run", case, "-o", output, "--resume"], folder, patience(20.0))
     report = Report(OUTCOMES.get(printed.status, "other"), wrong_words(printed), case.read_bytes())
     wanted = {"case.toml", "out.checkpoint"}
     if printed.status == 0:

@@ -198,6 +198,23 @@ def test_a_full_disk_keeps_the_table_that_was_there(tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == [table]
 
 
+@pytest.mark.parametrize("moment", ["mkdir", "clear"])
+def test_an_interrupt_leaves_no_folder_behind(moment, tmp_path, monkeypatch):
+    """While a folder is made, and while it is cleared, which take long on a slow disk."""
+    place = targets.os if moment == "mkdir" else targets.PrivateFolder
+    own = getattr(place, moment)
+
+    def interrupted(*arguments, **options):
+        if moment == "mkdir":
+            own(*arguments, **options)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(place, moment, interrupted)
+    with pytest.raises(KeyboardInterrupt), targets.written_whole(tmp_path / "a.csv") as part:
+        part.write_text("half")
+    assert list(tmp_path.iterdir()) == ([] if moment == "mkdir" else [tmp_path / "a.csv"])
+
+
 class Free:
     free, total = 0, 4096
 

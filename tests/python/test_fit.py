@@ -542,6 +542,7 @@ def test_warnings_report_what_is_not_determined():
             "contacts.back_force_ratio.to = 1.5: cannot be run",
         ),
         ({"free": {"run.seed": {"from": 1, "to": 5}}}, "no key that can be fitted"),
+        ({"free": {"contacts": {"delay": [0.1, 1]}}}, "fit.free.contacts.delay = [0.1, 1]: must"),
         ({"simulations": 10}, "at least 300"),
         ({"noise": "-1 uN"}, "must not be negative"),
         ({"smulations": 1000}, "did you mean 'simulations'"),
@@ -549,7 +550,7 @@ def test_warnings_report_what_is_not_determined():
 )
 def test_what_is_wrong_with_a_fit_is_reported(change, said):
     tables = fit_tables(**change)
-    with pytest.raises(ConfigError, match=said.replace("(", r"\(")):
+    with pytest.raises(ConfigError, match=re.escape(said)):
         Plan.from_dict(tables)
 
 

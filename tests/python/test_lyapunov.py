@@ -103,6 +103,8 @@ def test_a_shift_in_time_is_no_distance():
 
     _, none = transverse_distances(orbit(0.0, 0.0), orbit(1e-4, 0.0), 100)
     assert none.max() < 1e-7
+    rest = Orbit(time, np.ones((len(time), 2)), np.zeros((len(time), 2)))
+    assert transverse_distances(rest, rest, 100)[1].max() == 0
     times, grown = transverse_distances(orbit(0.0, 0.0), orbit(1e-4, 1e-6), 100)
     gain, length = growth(times, grown, 0.0, 1.0)
     assert gain / length == pytest.approx(0.3, rel=0.02)

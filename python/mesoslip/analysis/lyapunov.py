@@ -116,7 +116,9 @@ def transverse_distances(one: Orbit, other: Orbit, window: int) -> tuple[Array, 
     shape = (windows, 2 * window)
     difference = difference[: windows * window].reshape(shape)
     rate = rate[: windows * window].reshape(shape)
-    shift = np.sum(difference * rate, axis=1) / np.sum(rate**2, axis=1)
+    squares = np.sum(rate**2, axis=1)
+    # None where nothing moves.
+    shift = np.sum(difference * rate, axis=1) / np.where(squares > 0, squares, np.inf)
     transverse = difference - shift[:, np.newaxis] * rate
     times = one.time[first : first + windows * window].reshape(windows, window).mean(axis=1)
     return times, np.sqrt(np.sum(transverse**2, axis=1) / window)

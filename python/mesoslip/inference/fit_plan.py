@@ -436,9 +436,7 @@ def _flat(table: Mapping[str, Any], outer: str = "") -> Iterable[tuple[str, Any]
     """The entries of a table of dotted or nested keys, by dotted key."""
     for key, value in table.items():
         name = f"{outer}{key}"
-        is_range = not isinstance(value, Mapping) or not all(
-            isinstance(inner, Mapping) for inner in value.values()
-        )
+        is_range = not isinstance(value, Mapping) or any(one in value for one in RANGE_KEYS)
         if is_range or not value:
             yield name, value
         else:

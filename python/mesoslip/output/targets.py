@@ -162,12 +162,16 @@ def private_folder(parent: Path) -> Iterator[PrivateFolder]:
     """A new folder with a name that cannot be guessed, removed with its content."""
     name = f".mesoslip-{platform.node()}-{os.getpid()}-{secrets.token_hex(8)}"
     with _opened(parent) as outer:
-        os.mkdir(name, 0o700, dir_fd=outer)
-        with _cleared(name, outer, parent) as folder:
-            # Processes of other containers do not see whether this one is running.
-            with suppress(OSError):
-                fcntl.flock(folder.number, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            yield folder
+        try:
+            os.mkdir(name, 0o700, dir_fd=outer)
+            with _cleared(name, outer, parent) as folder:
+                # Processes of other containers do not see whether this one is running.
+                with suppress(OSError):
+                    fcntl.flock(folder.number, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                yield folder
+        finally:
+            # There still if an interrupt came while it was made or cleared.
+            shutil.rmtree(name, ignore_errors=True, dir_fd=outer)
 
 
 @contextmanager

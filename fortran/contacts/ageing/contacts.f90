@@ -47,8 +47,13 @@ module mesoslip_contacts_ageing_contacts
    !> queue is reversed: a receding bound would be approached in ever smaller steps
    real(wp), parameter :: near_behind = 1.0e-2_wp
 
+   !> Minimum number of breaks in a schedule of leaders, and maximum
+   integer, parameter :: min_listed = 8, max_listed = 48
+
    !> Contacts that age.
    type, extends(ageing_contacts_type) :: contact_ageing_type
+      !> Number of breaks in the next schedule of leaders, by how much happened in the last one
+      integer, private :: wanted = max_listed
    contains
       procedure :: initialize, offer, respond, plan, settle, join, leave, shift_order, exchange
       procedure, private, non_overridable :: break_due, reverse, plan_growing, settle_growing, &
@@ -198,11 +203,11 @@ contains
 
       integer :: number, event, contact(max_events)
 
-      call gather_leaders(self, pose)
+      call gather_leaders(self, pose, min(limit, self%wanted))
       self%cost = 1.0_wp
       schedule%unlisted = self%queue%first_key
       associate (list => self%list(leaders))
-         do event = 1, min(limit, max_events, list%count)
+         do event = 1, min(limit, self%wanted, list%count)
             associate (one => list%contact(list%count + 1 - event))
                if (self%is_falling(one) &
                   & .or. self%leader_key(list%count + 1 - event) >= schedule%unlisted) exit
@@ -285,6 +290,7 @@ contains
 
       integer :: event, first, contact(max_events)
 
+      self%wanted = min(max_listed, min_listed + 2 * max(schedule%broken, schedule%attached))
       self%prediction = schedule%prediction
       self%error_estimate = max(self%error_estimate, merge(schedule%lateness, 0.0_wp, &
          & schedule%lateness > schedule%resolution) * self%parameters%stiffness)

@@ -176,8 +176,8 @@ contains
          end if
          if (.not. step < max_step) exit
       end do
-      ! A slider that jumps approaches at a fixed time, and one that turns slowly at first: half of the
-      ! gap is for that.
+      ! A slider that jumps approaches at a fixed time, and one that turns slowly at first: half of
+      ! the gap is for that.
       if (speed < abs(self%prediction%acceleration) * step &
          & .or. (self%jumps .and. .not. speed > 0.0_wp)) step = 0.5_wp * step
       if (step < max_step) end_time = max(pose%time + step, nearest(pose%time, 1.0_wp))

@@ -20,8 +20,6 @@ module mesoslip_contacts_ageing_leaders
 
    !> Contacts that are taken out of the queue together
    integer, parameter :: max_gathered = 16
-   !> Leaders before the queue that are enough for a schedule
-   integer, parameter :: enough = max_events - max_gathered
 
 contains
 
@@ -80,9 +78,11 @@ contains
    end subroutine extrapolate_first
 
    !> Make leaders of the first contacts of the queue, for a schedule.
-   subroutine gather_leaders(self, pose)
+   subroutine gather_leaders(self, pose, number)
       class(ageing_contacts_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
+      !> Number of leaders before the queue that is enough
+      integer, intent(in) :: number
 
       integer :: surplus, position
 
@@ -98,8 +98,8 @@ contains
       end if
       do while (self%queue%first_key < huge(1.0_wp))
          associate (count => self%list(leaders)%count)
-            if (count >= enough) then
-               if (self%leader_key(count - enough + 1) < self%queue%first_key) exit
+            if (count >= number) then
+               if (self%leader_key(count - number + 1) < self%queue%first_key) exit
             end if
          end associate
          call gather(self, pose)

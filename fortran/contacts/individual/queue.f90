@@ -238,7 +238,7 @@ contains
       integer, intent(in) :: slot, contact
       logical, intent(out) :: is_found
 
-      integer :: chunk, first, last, length, place, position
+      integer :: chunk, first, last, length, position
 
       is_found = .false.
       first = self%bucket_chunk(slot)
@@ -247,19 +247,16 @@ contains
       chunk = first
       length = last
       do while (chunk /= 0)
-         ! Without an exit, so that the loop is vectorized.
-         place = 0
-         do position = 1, chunk_length
-            place = place + merge(position, 0, position <= length &
-               & .and. self%chunk_contact(position, chunk) == contact)
+         do position = 1, length
+            if (self%chunk_contact(position, chunk) == contact) exit
          end do
-         is_found = place > 0
+         is_found = position <= length
          if (is_found) exit
          length = chunk_length
          chunk = self%chunk_next(chunk)
       end do
       if (.not. is_found) return
-      self%chunk_contact(place, chunk) = self%chunk_contact(last, first)
+      self%chunk_contact(position, chunk) = self%chunk_contact(last, first)
       self%bucket_count(slot) = self%bucket_count(slot) - 1
       if (last > 1) return
       self%bucket_chunk(slot) = self%chunk_next(first)

@@ -69,6 +69,8 @@ contains
       class(ageing_contacts_type), intent(inout) :: self
       integer, intent(in) :: contact
 
+      ! Schedules let the time of the last scan pass.
+      if (self%list(falling)%count == 0) call clear_scan(self)
       self%kept(contact) = in_falling
       call append(self%list(falling), contact)
       call append(self%list(near), contact)

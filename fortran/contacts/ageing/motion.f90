@@ -18,8 +18,9 @@ contains
 
       logical :: is_steady
 
-      is_steady = self%direction * pose%velocity > 0.0_wp .and. .not. self%jumps &
-         & .and. .not. abs(pose%acceleration) > 0.0_wp
+      ! A slider with inertia that does not accelerate for a moment is not steady.
+      is_steady = pose%is_uniform .and. self%direction * pose%velocity > 0.0_wp &
+         & .and. .not. self%jumps
       if (self%is_steady) then
          if (is_steady .and. .not. abs(abs(pose%velocity) - self%speed) > 0.0_wp) return
          self%is_steady = .false.

@@ -24,7 +24,7 @@ module mesoslip_contacts_thermal_ageing
    use mesoslip_contacts_individual_record, only: row_limit, row_origin, row_renewal, row_stiffness
    use mesoslip_contacts_thermal_contacts, only: thermal_contacts_type, initialize_thermal, &
       & offer_thermal, respond_thermal
-   use mesoslip_contacts_thermal_keys, only: exchange_thermal, life_clock, life_key, life_left, &
+   use mesoslip_contacts_thermal_keys, only: exchange_thermal, life_key, life_left, &
       & rebuild_thermal
    use mesoslip_contacts_thermal_steady, only: grown, set_up_steady
    use mesoslip_hazard, only: never

@@ -68,7 +68,7 @@ module mesoslip_hazard
       !> For forces that change their sign: stretch at which a contact moves to the other clock,
       !> which may be larger where its rate is negligible
       procedure, non_overridable :: turn_stretch, delay_turns
-      !> Where and how long their hazard is negligible, and whether a motion is fast enough that they
+      !> Where and how long their hazard is negligible, and whether a motion is so fast that they
       !> need no step of their own
       procedure, non_overridable :: limit_turns, lets_turn_later
    end type hazard_type
@@ -181,7 +181,7 @@ contains
    end function turn_stretch
 
    !> Let contacts stay in their clocks as long as their rates are negligible in both. A slider that
-   !> rings moves most of them to and fro in this range.
+   !> rings moves most of them back and forth in this range.
    pure subroutine delay_turns(self)
       class(hazard_type), intent(inout) :: self
 

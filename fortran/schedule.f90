@@ -562,8 +562,8 @@ contains
       call self%skip_gone()
    end subroutine break_by_clock
 
-   !> Break the contacts that have reached their thresholds, and move those to the other clock whose
-   !> forces have changed their sign.
+   !> Break the contacts that have reached their thresholds, and move those to the other clock that
+   !> have reached where they turn.
    subroutine pass_coordinate(self, time, displacement)
       class(schedule_type), intent(inout) :: self
       real(wp), intent(in) :: time, displacement

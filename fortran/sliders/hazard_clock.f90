@@ -16,8 +16,9 @@ module mesoslip_sliders_hazard_clock
 
    !> Duration of a window over the time in which a clock is expected to reach its reading
    real(wp), parameter :: window_ratio = 1.25_wp
-   !> Remaining reading over that of the window at its first rate, beyond which it is not expected
-   real(wp), parameter :: max_expected = 3.0_wp
+   !> Remaining reading over that of the window at its first rate, beyond which it is not expected;
+   !> maximum duration of a window for that, against overflow [s]
+   real(wp), parameter :: max_expected = 3.0_wp, max_rest = 1.0e100_wp
 
    !> Maximum change of the exponent in a part of a step, in which the rule is exact to rounding
    real(wp), parameter :: max_change = 0.5_wp
@@ -64,18 +65,19 @@ contains
       real(wp), intent(in) :: time, velocity
       type(window_type), intent(inout) :: window
 
-      real(wp) :: expected, wanted
+      real(wp) :: expected, rest
       integer :: number
 
       expected = huge(1.0_wp)
+      rest = max_expected * min(window%end_time - time, max_rest)
       do number = 1, clocks
-         if (.not. (clock(number)%is_used .and. clock(number)%left < huge(1.0_wp))) cycle
-         wanted = clock(number)%left / clock(number)%rate
-         if (wanted > max_expected * (window%end_time - time)) cycle
-         expected = min(expected, expected_time(clock(number)%slope * velocity, wanted))
+         if (.not. clock(number)%is_used) cycle
+         if (clock(number)%left > rest * clock(number)%rate) cycle
+         expected = min(expected, expected_time(clock(number)%slope * velocity, &
+            & clock(number)%left / clock(number)%rate))
       end do
       if (expected < huge(1.0_wp)) window%end_time = min(window%end_time, &
-         & max(time + window_ratio * expected, nearest(time, 1.0_wp)))
+         & time + max(window_ratio * expected, epsilon(time) * time, tiny(time)))
    end subroutine limit_window
 
    !> Time in which the integral of exp(growth t) has a value; huge if it never has.

@@ -1,9 +1,9 @@
 !> Clocks of thermally activated breaking in steps in which their rates are series in time.
 !>
-!> The exponent of a rate is a polynomial of time. Where it changes little in a step its exponential
-!> function is a short series, and the time of a reading follows from the reversion of the integral
-!> and a step or two of Newton's method. Where it changes more but nearly linearly, the function is
-!> that of the linear term, times a short series of the others.
+!> The exponent of a rate is a polynomial of time. In most steps it changes little: then the mean of
+!> its exponential function follows from values and derivatives at both ends, and the time of a
+!> reading from a step or two of Halley's method. Where it bends more the function is a series, and
+!> where it changes more but nearly linearly that of the linear term, times a short series.
 module mesoslip_sliders_hazard_series
    use mesoslip_interface_law, only: clocks, hazard_clock_type
    use mesoslip_numerics_kinds, only: wp
@@ -13,19 +13,15 @@ module mesoslip_sliders_hazard_series
 
    public :: try_series
 
-   !> Relative change of a time after which another iteration changes nothing
-   real(wp), parameter :: converged = 1.0e-6_wp
+   !> Relative change of a time after which another iteration changes nothing, by methods of Newton
+   !> and of Halley
+   real(wp), parameter :: converged = 1.0e-6_wp, nearly = 1.0e-4_wp
    integer, parameter :: max_iterations = 60
-   !> A step is short if the first four terms of the exponent change it by no more than this, and
-   !> the others by nothing: the remainder of a series of the sixth order of its exponential
-   !> function is below 1e-15 of it
-   integer, parameter :: short_terms = 4, short_order = 6
-   real(wp), parameter :: max_short(short_terms) = [2.0e-2_wp, 1.0e-5_wp, 1.0e-7_wp, 1.0e-9_wp]
-   !> Maximum terms of the exponent in a step in which values and derivatives at both ends are enough,
-   !> to 1e-12, and of the sum of those beyond; weights of the first to third derivatives
-   integer, parameter :: end_terms = 4
-   real(wp), parameter :: max_end(end_terms) = [0.12_wp, 4.0e-3_wp, 1.0e-4_wp, 1.0e-6_wp], &
-      & max_end_rest = 5.0e-11_wp
+   !> Maximum terms of the exponent in a step in which values and derivatives at both ends are exact
+   !> to 2e-12, and of the sum of those beyond; weights of the first to third derivatives
+   integer, parameter :: end_terms = 6
+   real(wp), parameter :: max_end(end_terms) = [0.12_wp, 4.0e-3_wp, 1.0e-4_wp, 1.0e-6_wp, &
+      & 1.0e-8_wp, 1.0e-9_wp], max_end_rest = 1.0e-12_wp
    real(wp), parameter :: weight_1 = 3.0_wp / 28.0_wp, weight_2 = 1.0_wp / 84.0_wp, &
       & weight_3 = 1.0_wp / 1680.0_wp
    !> A middling step has a longer series, whose last coefficients show whether it is exact
@@ -51,6 +47,12 @@ module mesoslip_sliders_hazard_series
    real(wp), parameter :: moment(0:moment_terms - 1) = [(gamma(bent_order + 1.0_wp) &
       & / gamma(bent_order + 2.0_wp + i), i=0, moment_terms - 1)]
 
+   !> Mean of the exponential function of an exponent over a step: its parts even and odd in the
+   !> exponent; the function at the end, and the derivative of the exponent there.
+   type :: means_type
+      real(wp) :: even, odd, growth = 0.0_wp, slope = 0.0_wp
+   end type means_type
+
 contains
 
    !> Try a step in which the exponential function is a series: shorten it to the first time at
@@ -66,30 +68,44 @@ contains
       logical, intent(out) :: is_done
 
       real(wp) :: length, exponent(max_terms)
-      integer :: term
+      integer :: term, first
       logical :: may_end
 
       ended_by = 0
       ! Both clocks have one slope but for its sign.
       length = clock(1)%slope
-      do term = 1, terms
+      first = 1
+      if (terms >= end_terms) then
+         ! Of constant length, for the compiler.
+         do term = 1, end_terms
+            length = length * step
+            exponent(term) = series(term - 1) * inverse(term) * length
+         end do
+         first = end_terms + 1
+      else
+         exponent(terms + 1:end_terms) = 0.0_wp
+      end if
+      do term = first, terms
          length = length * step
          exponent(term) = series(term - 1) * inverse(term) * length
       end do
       ! Most steps end before any reading.
       may_end = any(clock%is_used .and. clock%left <= max_growth * (clock%rate * step))
+      is_done = all(abs(exponent(:end_terms)) <= max_end)
+      if (is_done .and. terms > end_terms) then
+         is_done = sum(abs(exponent(end_terms + 1:terms))) <= max_end_rest
+      end if
+      if (is_done .and. may_end) then
+         call advance_by_ends(clock, exponent(:end_terms), step, ended_by)
+      else if (is_done) then
+         call pass(clock, step, means_of(exponent(:end_terms)))
+      end if
+      if (is_done) return
       if (.not. may_end) then
-         call pass_by_ends(clock, exponent, terms, step, is_done)
-         if (.not. is_done) call pass_smooth(clock, exponent, terms, step, is_done)
+         call pass_smooth(clock, exponent, terms, step, is_done)
          if (is_done) return
       end if
       exponent(terms + 1:bent_order) = 0.0_wp
-      is_done = all(abs(exponent(:short_terms)) <= max_short) &
-         & .and. sum(abs(exponent(short_terms + 1:terms))) <= no_change
-      if (is_done) then
-         call advance_short(clock, exponent(:short_terms), step, ended_by)
-         return
-      end if
       is_done = sum(abs(exponent(:terms))) <= max_low
       if (is_done) call advance_middling(clock, exponent, step, ended_by, is_done)
       if (is_done) return
@@ -97,34 +113,84 @@ contains
       if (is_done) call advance_bent(clock, exponent, step, ended_by, is_done)
    end subroutine try_series
 
-   pure subroutine advance_short(clock, exponent, step, ended_by)
+   !> Shorten a step to the first time at which a clock reaches its reading, and advance the clocks.
+   pure subroutine advance_by_ends(clock, exponent, step, ended_by)
       type(hazard_clock_type), intent(inout) :: clock(clocks)
       !> The exponent of the first clock, over a step of length 1
-      real(wp), intent(in) :: exponent(short_terms)
+      real(wp), intent(in) :: exponent(end_terms)
       real(wp), intent(inout) :: step
+      !> The clock that ends the step, or 0
       integer, intent(out) :: ended_by
 
-      real(wp) :: time, part, mean(0:short_order, clocks)
+      real(wp) :: time, whole, direction
+      type(means_type) :: means
       integer :: number
 
       ended_by = 0
       time = 1.0_wp
+      means = means_of(exponent)
       do number = 1, clocks
          if (.not. clock(number)%is_used) cycle
-         mean(:, number) = short_means(sign(1.0_wp, clock(number)%slope * clock(1)%slope) &
-            & * exponent)
-         part = time_of(mean(:, number), short_order, clock(number)%left, &
-            & clock(number)%rate * step, time)
-         if (part > time) cycle
-         time = part
+         whole = clock(number)%rate * step
+         if (clock(number)%left > max_growth * time * whole) cycle
+         direction = sign(1.0_wp, clock(number)%slope * clock(1)%slope)
+         if (clock(number)%left > whole * (time * (means%even + direction * means%odd))) cycle
+         time = time_by_ends(direction * exponent, clock(number)%left / whole, time)
+         means = means_of(exponent_until(exponent, time))
          ended_by = number
       end do
-      do number = 1, clocks
-         if (clock(number)%is_used .and. number /= ended_by) clock(number)%elapsed &
-            & = clock(number)%rate * step * (time * horner(mean(:, number), short_order + 1, time))
+      call pass(clock, time * step, means)
+      if (ended_by == 0) return
+      clock(ended_by)%elapsed = 0.0_wp
+      step = time * step
+   end subroutine advance_by_ends
+
+   !> Time at which the integral of the exponential function has a value, by Halley's method.
+   pure function time_by_ends(exponent, wanted, latest) result(time)
+      !> The exponent, over a step of length 1
+      real(wp), intent(in) :: exponent(end_terms)
+      !> The integral, and a time at which it is not less
+      real(wp), intent(in) :: wanted, latest
+      real(wp) :: time
+
+      real(wp) :: change
+      type(means_type) :: means
+      integer :: iteration
+
+      time = 0.0_wp
+      if (.not. wanted > 0.0_wp) return
+      associate (b => 0.5_wp * exponent(1))
+         time = wanted * (1.0_wp - wanted * (b - wanted * (2.0_wp * b**2 &
+            & - inverse(3) * (2.0_wp * b**2 + exponent(2)))))
+      end associate
+      do iteration = 1, max_iterations
+         means = means_of(exponent_until(exponent, time))
+         change = (time * (means%even + means%odd) - wanted) / means%growth
+         change = change / (1.0_wp - 0.5_wp * change * means%slope / time)
+         time = time - change
+         ! Convergence is cubic.
+         if (abs(change) <= nearly * time) exit
       end do
-      if (ended_by > 0) step = time * step
-   end subroutine advance_short
+      time = min(time, latest)
+   end function time_by_ends
+
+   !> The exponent of a part of a step, over a step of length 1.
+   pure function exponent_until(exponent, time) result(part)
+      real(wp), intent(in) :: exponent(end_terms)
+      !> The part of the step
+      real(wp), intent(in) :: time
+      real(wp) :: part(end_terms)
+
+      real(wp) :: power
+      integer :: term
+
+      power = 1.0_wp
+      do term = 1, end_terms
+         power = power * time
+         part(term) = power * exponent(term)
+      end do
+   end function exponent_until
+
 
    !> Advance by a middling step, unless the series does not converge.
    pure subroutine advance_middling(clock, exponent, step, ended_by, is_done)
@@ -270,92 +336,49 @@ contains
       end do
    end function bent_time
 
-   !> Coefficients of the mean of the exponential function since the start of a short step, side by
-   !> side: exp(e_1 t) times the same of the other terms.
-   pure function short_means(e) result(mean)
-      !> The exponent, over a step of length 1
-      real(wp), intent(in) :: e(short_terms)
-      real(wp) :: mean(0:short_order)
-
-      real(wp) :: a_2, a_3, p_4, p_5, p_6
-
-      associate (a => e(1))
-         a_2 = 0.5_wp * a**2
-         a_3 = inverse(3) * a * a_2
-         p_4 = e(4) + 0.5_wp * e(2)**2
-         p_5 = e(2) * e(3)
-         p_6 = e(2) * e(4) + 0.5_wp * e(3)**2
-         mean(0) = 1.0_wp
-         mean(1) = inverse(2) * a
-         mean(2) = inverse(3) * (a_2 + e(2))
-         mean(3) = inverse(4) * (a_3 + (a * e(2) + e(3)))
-         mean(4) = inverse(5) * (inverse(6) * a_2**2 + (a_2 * e(2) + (a * e(3) + p_4)))
-         mean(5) = inverse(6) * ((0.1_wp * a_2 * a_3 + a_3 * e(2)) + (a_2 * e(3) + (a * p_4 + p_5)))
-         mean(6) = inverse(7) * ((0.05_wp * a_3**2 + inverse(6) * a_2**2 * e(2)) &
-            & + (a_3 * e(3) + (a_2 * p_4 + (a * p_5 + p_6))))
-      end associate
-   end function short_means
-
-   !> Advance clocks by a part of the mean of the exponential function over a step that is even in
-   !> the exponent, and one that is odd.
-   pure subroutine pass(clock, step, even, odd)
+   !> Advance clocks by the mean of the exponential function over a step.
+   pure subroutine pass(clock, step, means)
       type(hazard_clock_type), intent(inout) :: clock(clocks)
-      real(wp), intent(in) :: step, even, odd
+      real(wp), intent(in) :: step
+      type(means_type), intent(in) :: means
 
       integer :: number
 
       do number = 1, clocks
          if (clock(number)%is_used) clock(number)%elapsed = clock(number)%rate * step &
-            & * (even + sign(1.0_wp, clock(number)%slope * clock(1)%slope) * odd)
+            & * (means%even + sign(1.0_wp, clock(number)%slope * clock(1)%slope) * means%odd)
       end do
    end subroutine pass
 
-   !> Advance by a step which no clock ends, unless the exponent changes too much: from the
-   !> exponential function and its derivatives at both ends. The error of the mean is the eighth
-   !> derivative over 25401600.
-   pure subroutine pass_by_ends(clock, exponent, terms, step, is_done)
-      type(hazard_clock_type), intent(inout) :: clock(clocks)
-      !> The exponent of the first clock, over a step of length 1
-      real(wp), intent(in) :: exponent(max_terms)
-      integer, intent(in) :: terms
-      real(wp), intent(in) :: step
-      !> Whether it is advanced; if not, nothing has changed
-      logical, intent(out) :: is_done
+   !> Mean of the exponential function over a step from its values and three derivatives at both
+   !> ends. The error is its eighth derivative over 25401600.
+   pure function means_of(e) result(means)
+      !> The exponent, over a step of length 1
+      real(wp), intent(in) :: e(end_terms)
+      type(means_type) :: means
 
-      real(wp) :: total, slope, bend, twist, square, even, odd, even_late, odd_late, cosine, &
-         & sine
-      integer :: term
+      real(wp) :: total, bend, twist, square, even, odd, cosine, sine
 
-      is_done = terms >= end_terms
-      if (is_done) is_done = all(abs(exponent(:end_terms)) <= max_end) &
-         & .and. sum(abs(exponent(end_terms + 1:terms))) <= max_end_rest
-      if (.not. is_done) return
-      total = 0.0_wp
-      slope = 0.0_wp
-      bend = 0.0_wp
-      twist = 0.0_wp
-      do term = terms, 1, -1
-         total = total + exponent(term)
-         slope = slope + term * exponent(term)
-         bend = bend + (term * (term - 1)) * exponent(term)
-         twist = twist + (term * (term - 1) * (term - 2)) * exponent(term)
-      end do
-      ! Parts of the sums at each end that are even and odd in the exponent.
-      even_late = 0.5_wp + slope * (weight_2 * slope - (3.0_wp * weight_3) * bend)
-      odd_late = weight_2 * bend - slope * (weight_1 + weight_3 * slope**2) - weight_3 * twist
-      slope = exponent(1)
-      bend = 2.0_wp * exponent(2)
-      twist = 6.0_wp * exponent(3)
-      even = 0.5_wp + slope * (weight_2 * slope + (3.0_wp * weight_3) * bend)
-      odd = weight_2 * bend + slope * (weight_1 + weight_3 * slope**2) + weight_3 * twist
+      total = e(1) + (e(2) + (e(3) + (e(4) + (e(5) + e(6)))))
+      means%slope = e(1) + (2.0_wp * e(2) + (3.0_wp * e(3) + (4.0_wp * e(4) &
+         & + (5.0_wp * e(5) + 6.0_wp * e(6)))))
+      bend = 2.0_wp * e(2) + (6.0_wp * e(3) + (12.0_wp * e(4) + (20.0_wp * e(5) + 30.0_wp * e(6))))
+      twist = 6.0_wp * e(3) + (24.0_wp * e(4) + (60.0_wp * e(5) + 120.0_wp * e(6)))
       square = total**2
       cosine = 1.0_wp + square * (0.5_wp + square * ((1.0_wp / 24.0_wp) + square &
          & * ((1.0_wp / 720.0_wp) + square * (1.0_wp / 40320.0_wp))))
       sine = total * (1.0_wp + square * ((1.0_wp / 6.0_wp) + square * ((1.0_wp / 120.0_wp) &
-         & + square * (1.0_wp / 5040.0_wp))))
-      call pass(clock, step, even + (cosine * even_late + sine * odd_late), &
-         & odd + (cosine * odd_late + sine * even_late))
-   end subroutine pass_by_ends
+         & + square * ((1.0_wp / 5040.0_wp) + square * (1.0_wp / 362880.0_wp)))))
+      means%growth = cosine + sine
+      associate (slope => means%slope)
+         even = 0.5_wp + slope * (weight_2 * slope - (3.0_wp * weight_3) * bend)
+         odd = weight_2 * bend - slope * (weight_1 + weight_3 * slope**2) - weight_3 * twist
+      end associate
+      means%even = 0.5_wp + e(1) * (weight_2 * e(1) + (6.0_wp * weight_3) * e(2)) &
+         & + (cosine * even + sine * odd)
+      means%odd = (2.0_wp * weight_2) * e(2) + e(1) * (weight_1 + weight_3 * e(1)**2) &
+         & + (6.0_wp * weight_3) * e(3) + (cosine * odd + sine * even)
+   end function means_of
 
    !> Advance by a step which no clock ends, unless the exponent changes too much.
    pure subroutine pass_smooth(clock, exponent, terms, step, is_done)
@@ -384,7 +407,7 @@ contains
          & + square * (1.0_wp / 3628800.0_wp)))))
       odd = value * (1.0_wp + square * ((1.0_wp / 6.0_wp) + square * ((1.0_wp / 120.0_wp) &
          & + square * ((1.0_wp / 5040.0_wp) + square * (1.0_wp / 362880.0_wp)))))
-      call pass(clock, step, sum(weight_6 * even), sum(weight_6 * odd))
+      call pass(clock, step, means_type(even=sum(weight_6 * even), odd=sum(weight_6 * odd)))
    end subroutine pass_smooth
 
    !> The same of a middling step that changes the exponent little: of g = exp(e), n g_n is the sum

@@ -35,7 +35,12 @@ program test_hazard_clock
       & 0.5_wp, "smooth series")
    call the_first_ends_the_step([1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 100.0_wp, 0.0_wp], 0.1_wp, &
       & "series that is not smooth")
-   call smooth_steps_are_exact()
+   call check_largest([0.12_wp, 6.0e-2_wp, 4.0e-3_wp, 3.0e-4_wp, 1.0e-5_wp, 1.0e-5_wp], &
+      & 1.0e-15_wp, "smooth step")
+   call check_largest([0.12_wp, 4.0e-3_wp, 1.0e-4_wp, 1.0e-6_wp, 1.0e-8_wp, 1.0e-9_wp], &
+      & 2.0e-12_wp, "step by its ends")
+   call check_largest([-0.12_wp, 4.0e-3_wp, -1.0e-4_wp, 1.0e-6_wp, -1.0e-8_wp, 1.0e-9_wp], &
+      & 2.0e-12_wp, "step by its ends, the other direction")
    call contacts_turn_before_their_rates_count()
    call finish()
 
@@ -61,33 +66,44 @@ contains
                & - limit(contact))) < 1.01e-13_wp, "a contact turns while its rate is negligible")
          end do
       end do
-      call check(hazard%turn_stretch(1.0_wp) < 1.0e-11_wp, "at high temperature forces turn at once")
+      call check(hazard%turn_stretch(1.0_wp) < 1.0e-11_wp, &
+         & "at high temperature forces turn at once")
       hazard = hazard_type(rate=1.0e4_wp, slope=50.0_wp)
       call hazard%delay_turns()
       call check(hazard%turn_stretch(1.0_wp) > 0.2_wp, "at low temperature they turn late")
    end subroutine contacts_turn_before_their_rates_count
 
-   !> A step with the largest exponent that counts as smooth, against a rule of ten points.
-   subroutine smooth_steps_are_exact()
-      real(wp), parameter :: exponent(6) = 0.999_wp * [0.12_wp, 6.0e-2_wp, 4.0e-3_wp, 3.0e-4_wp, &
-         & 1.0e-5_wp, 1.0e-5_wp]
+   !> A step with the largest exponents of a rule, with and without an end, against ten points.
+   subroutine check_largest(exponent, tolerance, name)
+      !> The exponent over the step
+      real(wp), intent(in) :: exponent(6), tolerance
+      character(len=*), intent(in) :: name
+
       type(hazard_clock_type) :: clock(clocks)
       real(wp) :: step, series(6), expected
-      integer :: term, number
+      integer :: term, number, ended_by
       logical :: is_ended
 
-      series = [(term * exponent(term), term=1, size(exponent))]
-      clock%is_used = .true.
-      clock%slope = [1.0_wp, -1.0_wp]
-      clock%rate = 1.0_wp
-      clock%left = 1.0e3_wp
-      step = 1.0_wp
-      call advance_clocks(clock, series, size(series), step, is_ended)
-      do number = 1, clocks
-         expected = reading_after(clock(number)%slope, series, size(series), step)
-         call check_close(clock(number)%elapsed, expected, 1.0e-15_wp, "smooth step")
+      series = 0.999_wp * [(term * exponent(term), term=1, size(exponent))]
+      do ended_by = 0, clocks
+         clock%is_used = .true.
+         clock%slope = [1.0_wp, -1.0_wp]
+         clock%rate = 1.0_wp
+         clock%left = [(merge(0.8_wp, 1.0e3_wp, number == ended_by), number=1, clocks)]
+         clock%is_due = .false.
+         step = 1.0_wp
+         call advance_clocks(clock, series, size(series), step, is_ended)
+         call check(is_ended .eqv. ended_by > 0, name // ": end")
+         do number = 1, clocks
+            expected = reading_after(clock(number)%slope, series, size(series), step)
+            if (number == ended_by) then
+               call check_close(0.8_wp, expected, tolerance, name // ": reading at the end")
+            else
+               call check_close(clock(number)%elapsed, expected, tolerance, name)
+            end if
+         end do
       end do
-   end subroutine smooth_steps_are_exact
+   end subroutine check_largest
 
    !> Readings over parts of a step, and the times at which a clock reaches them.
    subroutine exercise(slope, series, name)

@@ -84,7 +84,7 @@ ARGUMENTS = {
     "velocity": lambda wrong: mesoslip.SteadySliding(CONFIG, wrong),
     "relative_width": lambda wrong: mesoslip.SteadySliding(CONFIG, relative_width=wrong),
     "number": lambda wrong: mesoslip.Realization(CONFIG, wrong),
-    "coarsening": lambda wrong: mesoslip.Realization(CONFIG, coarsening=wrong),
+    "resolution": lambda wrong: mesoslip.Realization(CONFIG, resolution=wrong),
     "time": lambda wrong: mesoslip.Realization(CONFIG).advance_to(wrong),
     "law": lambda wrong: mesoslip.ThresholdLaw(wrong, 0.1),
     "minimum": lambda wrong: mesoslip.ThresholdLaw("gaussian", 0.1, wrong),

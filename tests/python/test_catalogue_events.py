@@ -105,6 +105,19 @@ def test_bursts_of_a_channel_belong_to_slips(trace):
     assert one["median_lag"] == pytest.approx(3e-3, abs=2e-3)
 
 
+def test_a_burst_that_decays_is_one_event(trace):
+    """Near the threshold, noise and the ringing of the sensor cross it many times."""
+    rng = np.random.default_rng(2)
+    after = np.arange(600)
+    channel = 0.02 * rng.standard_normal(10000)
+    for start in range(500, 9500, 1000):
+        channel[start : start + 600] += 1.5 * np.exp(-after / 100) * np.sin(1.3 * after)
+    data = trace[0].to_dataset().assign(acoustic_emission=(("realization", "time"), [channel]))
+    found = emissions_of(xr.DataTree(data))
+    assert found.start_time == pytest.approx(np.arange(0.5, 9.5), abs=3e-3)
+    assert np.ptp(found.end_time - found.start_time) < 0.1
+
+
 def test_a_trigger_has_events_between_its_edges(trace):
     tree = trace[0].copy()
     level = np.zeros((1, 10000))

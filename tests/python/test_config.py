@@ -15,6 +15,7 @@ import mesoslip
 import numpy as np
 import pint
 import pytest
+import tomli_w
 from conftest import ROOT, klein_tables
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -632,6 +633,16 @@ def test_notebooks_show_a_short_table(klein):
     assert "(9 in total)" in shown
     assert shown.count("<tr>") == 6
     assert len(shown) < 2000
+
+
+def test_marks_at_the_start_of_texts_are_read_over(tmp_path):
+    """As editors of Windows write them, in a configuration and in a history that it names."""
+    table = "time [s],displacement [um]\n0,0\n1,0.1\n"
+    (tmp_path / "drive.csv").write_text(table, encoding="utf-8-sig")
+    path = tmp_path / "case.toml"
+    tables = klein_tables(drive={"history": {"file": "drive.csv"}}, run__duration=None)
+    path.write_text(tomli_w.dumps(tables), encoding="utf-8-sig")
+    assert Config.load(path).drive.history.displacement == pytest.approx((0, 1e-7))
 
 
 def links_in_a_loop(path):

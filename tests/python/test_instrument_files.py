@@ -43,7 +43,7 @@ BLUEHILL = (
         f'"{a:.4f}","{b:.4f}","{c:.4f}"\n' for a, b, c in zip(TIME, X, FORCE, strict=True)
     )
 )  # fmt: skip
-TESTXPERT = "Prüfzeit;Standardweg;Reibkraft\ns;mm;N\n" + rows(
+TESTXPERT = "Prüfzeit;Standardweg;Standardkraft\ns;mm;N\n" + rows(
     TIME, X, FORCE, between=";", decimal=","
 )
 CATMAN = (

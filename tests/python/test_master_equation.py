@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from conftest import at_end, long
-from mesoslip.simulation.audit import step_errors
+from mesoslip.errors import ConfigError
+from mesoslip.simulation import realization
+from mesoslip.simulation.audit import failed_checks, step_errors
 from mesoslip.simulation.realization import Realization
 from mesoslip.theory.force_curve import ForceCurve
 from oracles import frozen_law, stationary_force
@@ -662,3 +664,33 @@ def test_contacts_that_join_others_break_at_all_their_thresholds(klein):
     ]
     changes = [np.sqrt(np.mean(one**2)) for one in np.diff(displacements, axis=0)]
     assert changes[0] > 3 * changes[1]
+
+
+def test_a_tolerance_of_the_force_chooses_the_resolution(klein, monkeypatch):
+    """The run is that with the resolution, in one segment or several; a miss is reported."""
+    changes = {
+        "run__engine": "me",
+        "run__duration": 0.03,
+        "drive__velocity": 1e-5,
+        "output__interval": 1e-4,
+        **dispersion(0.2),
+    }
+    config = klein(run__force_tolerance=5e-5, **changes)
+    run = finish(config, 400, estimates_errors=True)
+    assert run.resolution < 0.25
+    assert run.force_error < 5e-5 * FORCE
+    assert not failed_checks(config, [run])
+    same = finish(klein(run__resolution=run.resolution, **changes), estimates_errors=True)
+    assert np.array_equal(run.trace, same.trace)
+    assert (run.force_error, run.slip_time_error) == (same.force_error, same.slip_time_error)
+
+    monkeypatch.setattr(realization, "MIN_RATIO", 0.9)
+    config = klein(run__force_tolerance=1e-9, **changes)
+    run = finish(config, estimates_errors=True)
+    assert run.resolution == pytest.approx(0.9**2 * 0.25)
+    assert "at most 1e-09; a smaller run.resolution helps" in "".join(failed_checks(config, [run]))
+
+
+def test_contacts_one_by_one_refuse_a_tolerance(klein):
+    with pytest.raises(ConfigError, match=r"force_tolerance.*needs engine \"me\""):
+        klein(run__force_tolerance=1e-4)

@@ -147,6 +147,21 @@ def test_load_and_speed_cut_together():
     assert len(plateaus_of(tree_of(time, force, load, speed), signal="speed").rows) == SPEEDS.size
 
 
+def test_a_column_of_the_viscosity(tmp_path):
+    """It is the abscissa of Stribeck's curve; a given viscosity goes before it."""
+    time, speed, load, force = record()
+    warm = np.repeat(np.linspace(90, 50, SPEEDS.size), SAMPLES)
+    header = "time [s];friction force [N];load [N];sliding speed [m/s];viscosity [mPa s]"
+    path = tmp_path / "a.csv"
+    columns = np.transpose([time, force, load, speed, warm])
+    np.savetxt(path, columns, delimiter=";", header=header, comments="", fmt="%.7g")
+    found = mesoslip.plateaus(mesoslip.read_trace(path))
+    expected = 1e-3 * np.linspace(90, 50, SPEEDS.size) * SPEEDS / LOAD
+    assert found["hersey_number"].values == pytest.approx(expected, rel=2e-3)
+    given = mesoslip.plateaus(mesoslip.read_trace(path), viscosity=0.09)
+    assert given["hersey_number"].values == pytest.approx(0.09 * SPEEDS / LOAD, rel=2e-3)
+
+
 def test_ramps_and_noise_have_no_steps():
     rng = np.random.default_rng(1)
     noise = lfilter([1.0], [1.0, -0.9], rng.standard_normal(4000))

@@ -113,6 +113,14 @@ def test_what_dies_away_is_not_settled(klein):
 def test_a_run_that_ends_too_soon_is_transient(klein):
     assert result(klein(), 1e-5 * TIME).regime == TRANSIENT
     assert result(klein(), sawtooth([0.6, 0.6], [0.8, 0.8])).regime == TRANSIENT
+    # The spring has taken most of the displacement of the drive, 20 nm.
+    config = klein(drive__velocity=1e-6, contacts__count=50)
+    time = 0.02 * TIME
+    for share, regime in ((0.95, TRANSIENT), (0.2, SMOOTH)):
+        force = 1e-5 + share * config.slider.stiffness * 1e-6 * time
+        scales = Scales.of_config(config, time[-1])
+        found = classify(scales, time, force, np.ones(len(time)), NO_SLIPS)
+        assert found.regime == regime
     # The drive has not moved by a breaking stretch.
     slow = klein(drive__velocity=1e-9)
     assert result(slow, np.full(len(TIME), 1e-5)).regime == TRANSIENT

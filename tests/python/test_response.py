@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import math
+import shutil
 
 import mesoslip
 import numpy as np
@@ -420,7 +421,8 @@ def test_the_command(tmp_path, command, monkeypatch):
     assert rows[1]["hold_time [s]"]
     assert not rows[1]["steady_force [N]"]
     assert rows[3]["net_change [N]"]
-    out = command.output("response", path, path, "--no-fit")
+    again = shutil.copy(path, tmp_path / "again.nc")
+    out = command.output("response", path, again, "--no-fit")
     assert out.count("Holds") == 1
     assert "Rate and state" not in out
     figure = mesoslip.plot(path, tmp_path / "a.png", view="response", width="8.6 cm")

@@ -512,8 +512,25 @@ def test_the_period_of_revolutions_is_found() -> None:
     assert found_period(np.arange(0, 200, 0.02), wave) == pytest.approx(1 / 1.99, rel=1e-4)
     found = strokes_of(record_tree(time, force), period="auto")
     assert found.notes[0].startswith("guess: a revolution takes 923")
+    # A running-in is larger than what repeats itself.
+    worn = force + 3 * np.ptp(force) * np.exp(-time / (0.1 * time[-1]))
+    found = strokes_of(record_tree(time, worn), period="auto")
+    assert found.notes[0].startswith("guess: a revolution takes 92")
     with pytest.raises(mesoslip.FileError, match="does not repeat"):
         mesoslip.strokes(record_tree(time, rng.standard_normal(time.size)), period="auto")
+
+
+def test_the_track_is_no_error_of_whole_revolutions() -> None:
+    """The mean over a revolution has no part of its run-out, however large."""
+    rng = np.random.default_rng(4)
+    time = np.arange(0, 100, 0.02)
+    turn = math.tau * time / 0.733
+    force = 5 + 0.5 * np.sin(turn) + 0.2 * np.sin(2 * turn + 1)
+    force += 0.02 * rng.standard_normal(time.size)
+    rows = strokes_of(record_tree(time, force), period=0.733).columns["strokes"]
+    errors = rows["mean_friction_error"]
+    assert np.median(errors) < 0.015
+    assert np.mean(np.abs(rows["mean_friction"] - 5) < 1.96 * errors) > 0.9
 
 
 def strokes_of_made(number: int, tmp_path):

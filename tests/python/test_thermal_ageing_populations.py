@@ -121,7 +121,7 @@ def test_steps_of_a_hold_are_not_as_short_as_the_delay(delay):
             "output": {"interval": 0.05},
         }
     )
-    with Realization(config, estimates_errors=False, coarsening=2.0) as run:
+    with Realization(config, estimates_errors=False, resolution=0.5) as run:
         while not run.finished and run.advances < 3000:
             run.advance(500)
         assert run.finished

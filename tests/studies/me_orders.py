@@ -136,7 +136,7 @@ def draw(outcomes: list[Outcome], path: Path) -> None:
     """Histograms of the orders, and of what runs say of their errors over what these are."""
     figure, axes = plt.subplots(1, 2, figsize=(7.2, 2.8), layout="constrained")
     orders = np.array([one.order for one in outcomes])
-    axes[0].hist(orders[np.isfinite(orders)], bins=np.arange(0.75, 2.76, 0.125), color="C0")
+    axes[0].hist(orders[np.isfinite(orders)], bins=np.arange(0.25, 2.76, 0.125), color="C0")
     axes[0].axvline(np.nanmedian(orders), color="0.3", linewidth=1)
     axes[0].set(xlabel="order of convergence", ylabel="runs")
     force = ratios(outcomes, "force_error")

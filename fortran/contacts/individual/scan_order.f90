@@ -25,7 +25,7 @@ module mesoslip_contacts_individual_scan_order
    !> Late contacts beyond this part of all, 1/16, cause a new scan
    integer, parameter :: late_part = 16
    !> Bins in which contacts are sorted: their maximum number, mean and maximum contacts in one
-   integer, parameter :: max_bins = 4096, bin_load = 4, max_load = 64
+   integer, parameter :: max_bins = 4096, bin_load = 2, max_load = 64
    !> Ratio of two keys up to which those between are sorted as uniform
    real(wp), parameter :: max_ratio = 8.0_wp
    !> Keys that are sampled to estimate a horizon
@@ -262,7 +262,7 @@ contains
       class(scan_order_type), intent(inout) :: self
 
       real(wp) :: start, horizon
-      integer :: contact, last
+      integer :: last
 
       start = self%horizon
       if (.not. (start > -none .and. self%reach > 0.0_wp)) then
@@ -272,14 +272,7 @@ contains
       horizon = none
       if (self%reach < none - start) horizon = max(start + self%reach, nearest(start, 1.0_wp))
       last = slack
-      associate (key => self%key, near_key => self%near_key, near_contact => self%near_contact)
-         ! Without a branch: each is written, and counted if it is below.
-         do contact = 1, size(key)
-            near_key(last + 1) = key(contact)
-            near_contact(last + 1) = contact
-            last = last + merge(1, 0, key(contact) < horizon)
-         end do
-      end associate
+      call collect(self%key, horizon, self%near_key, self%near_contact, last)
       self%horizon = horizon
       self%next = slack + 1
       self%last = last
@@ -297,6 +290,27 @@ contains
          if (self%reach < none / max_factor) self%reach = 2.0_wp * self%reach
       end if
    end subroutine scan
+
+   !> Append the contacts with keys below a horizon to a list, without a branch: each is written, and
+   !> counted if it is below.
+   pure subroutine collect(key, horizon, near_key, near_contact, last)
+      real(wp), intent(in), contiguous :: key(:)
+      real(wp), intent(in) :: horizon
+      !> The list, and its last entry
+      real(wp), intent(inout), contiguous :: near_key(:)
+      integer, intent(inout), contiguous :: near_contact(:)
+      integer, intent(inout) :: last
+
+      integer :: contact, entry
+
+      entry = last
+      do contact = 1, size(key)
+         near_key(entry + 1) = key(contact)
+         near_contact(entry + 1) = contact
+         entry = entry + merge(1, 0, key(contact) < horizon)
+      end do
+      last = entry
+   end subroutine collect
 
    !> Sort contacts by key, then by number; the keys are nearly uniform between two values, or their
    !> logarithms are.

@@ -53,7 +53,8 @@ def text_of(path: Path, kind: str, max_bytes: int = MAX_BYTES) -> str:
                 f"{path}: {state.st_size / 2**20:.0f} MiB is too large for {kind}; "
                 f"the maximum is {max_bytes / 2**20:.0f} MiB"
             )
-        return path.read_text(encoding="utf-8")
+        # Editors of Windows begin a text with a mark.
+        return path.read_text(encoding="utf-8-sig")
     except FileNotFoundError:
         # The folder is that of the configuration, or the present one for a name in --set.
         beside = "" if path.is_absolute() else f" in {Path.cwd()}"

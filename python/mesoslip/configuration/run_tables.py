@@ -81,6 +81,10 @@ class Run(Table):
     resolution: Annotated[Number, Field(gt=0, le=1)] = 0.25
     """With engine `me`: width of a population of contacts, relative to the standard deviation of
     the breaking stretches; smaller is more precise."""
+    force_tolerance: Annotated[Number, Field(gt=0, lt=1)] | None = None
+    """With engine `me`: error of the contact force over the static force that is accepted. A run
+    whose estimated `force_error` is above it is repeated, up to twice, with the smaller resolution
+    that the second order of the steps says; the output has that of the last repeat."""
 
     @property
     def stops(self) -> Stop:

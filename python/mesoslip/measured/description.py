@@ -169,6 +169,8 @@ class Columns(Table):
     """Radius of the track on a disc, or of a journal."""
     sliding_speed: ColumnField = None
     """Speed of sliding; without it that of the rotation at the radius."""
+    viscosity: ColumnField = None
+    """Viscosity of the lubricant, for Stribeck's curve."""
 
 
 class TraceDescription(Table):

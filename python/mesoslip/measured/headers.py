@@ -23,6 +23,7 @@ QUANTITIES = {
     "torque": "N*m",
     "radius": "m",
     "sliding_speed": "m/s",
+    "viscosity": "Pa*s",
     "acoustic_emission": "V",
 }
 # A displacement, of the load point or of the slider.
@@ -35,8 +36,8 @@ NAMES = {
     "|pr fzeit|pruefzeit|time 1 default sample rate",
     "force": "force|spring force|shear force|shear load|friction force|frictional force"
     "|lateral force|tangential force|horizontal force|pulling force|traction force|drive force"
-    "|driving force|kraft|reibkraft|ft|f t|ff|f f|fx|f x|f|fs|force x|force t|force tangential"
-    "|horizontal load|force de frottement|force tangentielle",
+    "|driving force|kraft|reibkraft|standardkraft|ft|f t|ff|f f|fx|f x|f|fs|force x|force t"
+    "|force tangential|horizontal load|force de frottement|force tangentielle",
     "shear_stress": "shear|shear stress|shearstress|tau|τ|shear strs|stress shear",
     "friction": "friction|friction coefficient|coefficient of friction|friction coeff"
     "|friction coef|coef of friction|coeff of friction|cof|mu|f mg|f over mg|f over n|f fn"
@@ -61,6 +62,7 @@ NAMES = {
     "|turns",
     "rotation_speed": "rotation speed|rotational speed|speed of rotation|spindle speed"
     "|rotation frequency|rpm|drehzahl|angular velocity|angular speed",
+    "viscosity": "viscosity|dynamic viscosity|viskosit t|viscosit|viscosidad|eta",
     "acoustic_emission": "acoustic emission|ae|ae rms|ae signal|acoustic|acoustic signal|trigger"
     "|piezo|hydrophone|microphone",
     "torque": "torque|friction torque|frictional torque|moment|drehmoment|reibmoment|mz|tz",

@@ -12,9 +12,10 @@ import numpy as np
 
 from mesoslip.array_types import Array
 from mesoslip.errors import FileError, shown
-from mesoslip.measured.columns import FORCES, Assignment, Used, assign, sentinels, values_of
+from mesoslip.measured.columns import FORCES, Assignment, Used, assign, values_of
 from mesoslip.measured.description import Column, TraceDescription
 from mesoslip.measured.headers import QUANTITIES, name_of
+from mesoslip.measured.missing import sentinels
 from mesoslip.measured.parts import continued, joined
 from mesoslip.measured.reading.blocks import blocks_of
 from mesoslip.measured.reading.file import read_file
@@ -27,7 +28,7 @@ MIN_SAMPLES = 4
 # Quantities of a record that are variables of outputs.
 SIGNALS = (
     *("normal_force", "normal_stress", "revolutions", "rotation_speed", "sliding_speed"),
-    "acoustic_emission",
+    *("viscosity", "acoustic_emission"),
 )
 
 

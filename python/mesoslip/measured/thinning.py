@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from mesoslip.array_types import Array
 from mesoslip.errors import FileError
-from mesoslip.measured.columns import Assignment, sentinels
+from mesoslip.measured.columns import Assignment
+from mesoslip.measured.missing import sentinels
 from mesoslip.measured.reading.table import BadCell, Table
 from mesoslip.quantities import number
 

@@ -211,6 +211,8 @@ def _root(results: Results) -> GroupLayout:
         totals.append("force_error")
     if config.contact_kind.step_work_bound > 0:
         totals.append("slip_time_error")
+    if config.run.force_tolerance is not None:
+        totals.append("resolution")
     if config.has_avalanches:
         totals += ["avalanche_count", "avalanche_slip"]
     energies = np.array([one.energy for one in realizations])

@@ -45,8 +45,9 @@ class Realization(realization.Realization):
     estimates_errors
         Whether a run of the master equation is repeated with steps twice as long, which estimates
         the errors due to its steps.
-    coarsening
-        Length of steps relative to the configured one, where there are steps.
+    resolution
+        Resolution of the master equation; by default that of the configuration, or one with which
+        the error of the force is within ``run.force_tolerance``.
     after
         The end of another run, which this one continues, see `end`; its errors are then not
         estimated, and its time and displacement start at 0. By default the run starts with
@@ -89,6 +90,8 @@ class Realization(realization.Realization):
     slip_time_error
         Estimated error of the time at which a slip starts [s], maximum over the slips; 0 or NaN as
         ``force_error``.
+    resolution
+        Resolution of the master equation.
     integrator_counts
         Steps, evaluations and failed steps of the slider's integrator, if it has one.
     """

@@ -149,6 +149,7 @@ MEASURED = Group(
     revolutions=Meaning("1", "number of revolutions of the disc"),
     rotation_speed=Meaning("s-1", "revolutions of the disc per time"),
     sliding_speed=Meaning("m s-1", "speed of sliding"),
+    viscosity=Meaning("Pa s", "viscosity of the lubricant"),
     acoustic_emission=Meaning("V", "acoustic emission, or another second channel"),
 )
 # Variables with the force of a run or of a measured trace, and their units.
@@ -180,6 +181,7 @@ ROOT = Group(
     slip_time_error=Meaning(
         "s", "estimated error of the time at which a slip starts, maximum over all slips"
     ),
+    resolution=Meaning("1", "resolution of the master equation"),
     energy_residual=Meaning(
         "1", "residual of the energy balance over the work of the drive, forth and back"
     ),

@@ -60,10 +60,11 @@ def failed_checks(config: Config, realizations: Sequence[Realization]) -> list[s
             f"it should be at most {contacts.step_work_bound:.1g}{remedy}"
         )
     error = max(one.force_error for one in realizations) / config.contacts.static_force
-    if contacts.force_error_bound > 0 and error > contacts.force_error_bound:
+    bound = config.run.force_tolerance or contacts.force_error_bound
+    if bound > 0 and error > bound:
         failed.append(
             f"the error of the contact force is about {error:.1g} of the static force; "
-            f"it should be at most {contacts.force_error_bound:.1g}{remedy}"
+            f"it should be at most {bound:.1g}{remedy}"
         )
     return failed
 

@@ -51,6 +51,11 @@ FIRST_WORK = 2_000.0
 SHORT_WORK = 100_000.0
 # Work of estimating the errors over the whole work.
 COARSE_PART = 0.25
+# Maximum number of runs until the error of the force is tolerated; error over the tolerance that
+# the next resolution aims at; minimum ratio of resolutions.
+MAX_ATTEMPTS = 3
+AIMED_PART = 0.7
+MIN_RATIO = 0.1
 # No bound on the advances or the work of a segment.
 ANY_NUMBER = 2**62
 # Maximum number of advances at a time in `Realization.advance_to`.
@@ -59,7 +64,7 @@ MAX_ADVANCES = 100_000
 # Attributes of a realization that a checkpoint keeps as they are.
 SAVED_ATTRIBUTES = (
     *("time", "ending", "breaks", "detached", "advances", "kernel_seconds", "avalanche_count"),
-    *("avalanche_slip", "displacement", "force_error", "slip_time_error"),
+    *("avalanche_slip", "displacement", "force_error", "slip_time_error", "resolution"),
 )
 
 
@@ -83,6 +88,8 @@ class Realization(Recorded):
         *(
             "_lacks_errors",
             "_has_steps",
+            "_attempt",
+            "_attempts_left",
             "_is_discrete",
             "_after",
             "_has_failed",
@@ -98,7 +105,7 @@ class Realization(Recorded):
         config=arguments.instance(Config, "a Config"),
         number=arguments.whole(0),
         estimates_errors=arguments.flag,
-        coarsening=arguments.number(0, is_open=True),
+        resolution=arguments.number(0, is_open=True),
         after=arguments.instance(End, "the end of another realization"),
     )
     def __init__(
@@ -107,7 +114,7 @@ class Realization(Recorded):
         number: int = 0,
         *,
         estimates_errors: bool = True,
-        coarsening: float = 1.0,
+        resolution: float | None = None,
         after: End | None = None,
     ) -> None:
         check_memory(config)
@@ -130,13 +137,18 @@ class Realization(Recorded):
         self._parameters = contacts.kernel_parameters(config)
         self._coarse: Realization | None = None
         self._lacks_errors = False
-        longer = contacts.coarse_parameters(config, coarsening)
-        self._has_steps = longer is not None
+        self.resolution = config.run.resolution if resolution is None else resolution
+        parameters = contacts.parameters_with(config, self.resolution)
+        self._has_steps = parameters is not None
+        self._attempt: Realization | None = None
+        self._attempts_left = 0
         self._is_discrete = contacts.is_discrete
-        if longer is not None:
-            self._parameters = longer
+        if parameters is not None:
+            self._parameters = parameters
             self._lacks_errors = estimates_errors and after is None
             self.force_error = self.slip_time_error = math.nan
+            if self._lacks_errors and resolution is None and config.run.force_tolerance is not None:
+                self._attempts_left = MAX_ATTEMPTS
         self._after = after
         self._has_failed = False
         self._start = START
@@ -203,6 +215,9 @@ class Realization(Recorded):
         """
         if self.finished:
             return
+        if self._attempts_left > 0:
+            self._advance_attempt(advances, work)
+            return
         if self.ending:
             self._estimate_errors(advances, work)
             return
@@ -224,11 +239,45 @@ class Realization(Recorded):
         if advances is None and work is None:
             self._work *= min(2.0, max(0.1, SEGMENT_SECONDS / max(seconds, 1e-9)))
 
+    def _advance_attempt(self, advances: int | None, work: float | None) -> None:
+        """Advance a whole run with some resolution by one segment. At its end this one becomes it,
+        unless its error is above the tolerance and says a smaller resolution for another."""
+        if self._attempt is None:
+            self._attempt = Realization(self.config, self.number, resolution=self.resolution)
+        attempt, before = self._attempt, self._attempt.kernel_seconds
+        attempt.advance(advances, work=work)
+        self.kernel_seconds += attempt.kernel_seconds - before
+        if not attempt.finished:
+            return
+        self._attempts_left -= 1
+        self._attempt = None
+        tolerance = (self.config.run.force_tolerance or 0.0) * self.config.contacts.static_force
+        if self._attempts_left == 0 or attempt.force_error <= tolerance:
+            self._become(attempt)
+            return
+        attempt.close()
+        # The error is proportional to the square of the resolution.
+        ratio = math.sqrt(AIMED_PART * tolerance / attempt.force_error)
+        self.resolution *= max(MIN_RATIO, ratio)
+
+    def _become(self, other: Realization) -> None:
+        """Be another realization of the same configuration and number, which is finished."""
+        seconds = self.kernel_seconds
+        with self._lock:
+            for name in Realization.__slots__:
+                if name != "_lock":
+                    setattr(self, name, getattr(other, name))
+            self._tables = other._tables
+        self.kernel_seconds = seconds
+
     def _estimate_errors(self, advances: int | None, work: float | None) -> None:
         """Advance the run with longer steps by one segment; at its end the errors are known."""
         if self._coarse is None:
             self._coarse = Realization(
-                self.config, self.number, estimates_errors=False, coarsening=COARSENING
+                self.config,
+                self.number,
+                estimates_errors=False,
+                resolution=COARSENING * self.resolution,
             )
         coarse, before = self._coarse, self._coarse.kernel_seconds
         try:
@@ -382,9 +431,10 @@ class Realization(Recorded):
         if self._kernel is not None:
             self._kernel.close()
             self._kernel = None
-        if self._coarse is not None:
-            self._coarse.close()
-            self._coarse = None
+        for other in (self._coarse, self._attempt):
+            if other is not None:
+                other.close()
+        self._coarse = self._attempt = None
 
     @property
     def _is_new(self) -> bool:
@@ -410,6 +460,9 @@ class Realization(Recorded):
         """Completed part of the run, 0 to 1."""
         if self.finished:
             return 1.0
+        if self._attempts_left > 0:
+            part = self._attempt.part_done if self._attempt is not None else 0.0
+            return (MAX_ATTEMPTS - self._attempts_left + part) / MAX_ATTEMPTS
         part = 1.0 if self.ending else self._part_of_run()
         if self._lacks_errors:
             coarse = self._coarse.part_done if self._coarse is not None else 0.0

@@ -15,8 +15,9 @@ from mesoslip.output.arrays import Tree
 CHANNEL = "acoustic_emission"
 # Threshold over the standard deviation of the noise: chance exceeds it once in 10^9 samples.
 THRESHOLD = 6.0
-# Maximum number of values of a trigger, and samples below the threshold that end an event.
-TRIGGER_VALUES, DEAD_SAMPLES = 3, 10
+# Maximum number of values of a trigger, and samples below a share of the threshold that end an
+# event.
+TRIGGER_VALUES, DEAD_SAMPLES, END = 3, 10, 0.5
 
 
 @dataclass(frozen=True)
@@ -38,7 +39,8 @@ def emissions_of(tree: Tree, threshold: float | None = None) -> Emissions:
 
     A channel of two or three values is a trigger, whose events are between its edges. Of others the
     distance from the median is an event where it exceeds a threshold, by default 6 standard
-    deviations of the noise. Samples closer than 10 intervals belong to one event.
+    deviations of the noise; it ends when it is below half of that for 10 intervals, so that a burst
+    that decays is one event.
     """
     if CHANNEL not in tree.data_vars:
         raise FileError(
@@ -60,7 +62,9 @@ def emissions_of(tree: Tree, threshold: float | None = None) -> Emissions:
     if not above.size:
         none = np.empty(0)
         return Emissions(none, none, none, none, threshold, is_trigger)
-    cuts = np.flatnonzero(np.diff(time[above]) > rest) + 1
+    beyond = np.flatnonzero(size > END * threshold)
+    starts = beyond[np.append(0, np.flatnonzero(np.diff(time[beyond]) > rest) + 1)]
+    cuts = np.flatnonzero(np.diff(np.searchsorted(starts, above, side="right"))) + 1
     first, last = above[np.append(0, cuts)], above[np.append(cuts - 1, above.size - 1)]
     weights = size**2 * np.gradient(time)
     total = np.concatenate([[0.0], np.cumsum(weights)])

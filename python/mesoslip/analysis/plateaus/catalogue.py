@@ -123,8 +123,7 @@ def plateaus_of(
 ) -> Plateaus:
     """The plateaus of all realizations of an output; see `plateaus`."""
     apparatus = apparatus_of(tree, name)
-    if viscosity is None:
-        viscosity = _viscosity(tree)
+    given = viscosity if viscosity is not None else _viscosity(tree)
     rows: list[dict[str, Any]] = []
     source = ""
     for index in range(tree.sizes.get("realization", 1)):
@@ -132,7 +131,7 @@ def plateaus_of(
             raise FileError(f"{name}: goes back and forth: mesoslip strokes has its friction")
         levels, source = _levels(tree, index, apparatus.force_name, signal, name)
         signals = _signals(tree, index, apparatus.force_name)
-        means = [row for one in levels if (row := _row(signals, one, viscosity)) is not None]
+        means = [row for one in levels if (row := _row(signals, one, given)) is not None]
         rows += [
             {"realization_index": index, "plateau_number": number} | one
             for number, one in enumerate(means, 1)
@@ -141,7 +140,7 @@ def plateaus_of(
         raise FileError(
             f"{name}: has no plateau by the {source}: no {MIN_SAMPLES} samples at one level"
         )
-    return Plateaus(PLATEAUS.columns(rows), apparatus.force_unit, source, viscosity)
+    return Plateaus(PLATEAUS.columns(rows), apparatus.force_unit, source, given)
 
 
 def _viscosity(tree: Tree) -> float | None:
@@ -156,7 +155,7 @@ def _signals(tree: Tree, index: int, force_name: str) -> dict[str, Array]:
     root = tree.to_dataset()
     force = root[force_name].values[index].astype(float)
     found = {"time": root["time"].values.astype(float), FORCE: force}
-    for name in (*MACHINE, "drive_displacement"):
+    for name in (*MACHINE, "viscosity", "drive_displacement"):
         if name in root and (force_name == "spring_force" or name != "normal_force"):
             found[name] = _of(root[name].values, index)
     return found
@@ -262,6 +261,8 @@ def _row(
             ratio = mean / size
             error = _mean_of(sign * force[start:] - ratio * load)[1] / size
             row |= {"mean_friction_coefficient": ratio, "mean_friction_coefficient_error": error}
+    if viscosity is None and "viscosity" in signals:
+        viscosity = float(np.nanmean(signals["viscosity"][inside]))
     if viscosity is not None and {"sliding_speed", "normal_force"} <= row.keys():
         row["hersey_number"] = viscosity * row["sliding_speed"] / row["normal_force"]
     return row

@@ -75,9 +75,13 @@ def classify(
     cycles = find_cycles(
         time, force, np.clip(force, low - excursion, high + excursion), TURNING * (high - low)
     )
-    moved = abs(stage.velocity) * (time[-1] - time[0])
+    rise = 2 * float(np.mean(force[half:]) - np.mean(force[:half]))
     slip_share = _slip_share(scales, time, force, slips)
     loading = 0.0 if scales.is_measured else scales.loading_rate * (time[-1] - time[0])
+    # The rest of the drive's displacement is in the spring.
+    moved = abs(stage.velocity) * (time[-1] - time[0])
+    if loading > 0:
+        moved *= max(0.0, 1 - rise / loading)
     cycles, are_slips = events_of(slips, cycles, loading)
     change, error = trend(cycles.falls)
     numbers = {
@@ -93,7 +97,7 @@ def classify(
         "peak_correlation": correlation(cycles.peaks),
         "amplitude_change": change,
         "amplitude_change_error": error,
-        "drift": float(np.mean(force[half:]) - np.mean(force[:half])) / static,
+        "drift": rise / 2 / static,
         "fast_share": math.nan,
         "stick_share": math.nan,
         "slips": len(slips),

@@ -48,7 +48,7 @@ class Scales:
     noise_amplitude: float
     """Amplitude of smooth sliding by noise alone."""
     renewal_displacement: float
-    """Displacement of the drive in which all contacts break [m]; 0 if unknown."""
+    """Displacement of the slider in which all contacts break [m]; 0 if unknown."""
     stiffness: float
     is_rigid: bool
     """Whether the slider moves as the drive, so that it neither sticks nor slips."""

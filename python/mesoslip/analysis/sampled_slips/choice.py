@@ -72,16 +72,20 @@ class Choice(NamedTuple):
 
 def chosen(every: Iterable[Level]) -> Choice:
     """The smallest minimum fall at which slips stand out, of the median with the longest plateau of
-    those that find about as many; on the plateau, the one from which their number is constant over
-    the widest range."""
+    those that find about as many; on the plateau, from which on their number is constant, if it is
+    anywhere."""
     best = max((_at(level) for level in every), key=_persistence)
     if best.counts.plateau is None:
         return best
     first, last = best.counts.plateau
     inside = (best.counts.threshold >= first) & (best.counts.threshold <= last)
-    changes = np.diff(best.counts.count[inside], prepend=-1, append=-1)
-    starts = np.flatnonzero(changes)
-    min_fall = float(best.counts.threshold[inside][starts[np.argmax(np.diff(starts))]])
+    threshold, count = best.counts.threshold[inside], best.counts.count[inside]
+    starts = np.flatnonzero(np.diff(count, prepend=-1))
+    ends = np.append(starts[1:], count.size) - 1
+    constant = starts[threshold[ends] >= MIN_PLATEAU * threshold[starts]]
+    if constant.size == 0:
+        return best
+    min_fall = float(threshold[constant[0]])
     tops, bottoms = best.level.slips(min_fall)
     return best._replace(min_fall=min_fall, tops=tops, bottoms=bottoms)
 

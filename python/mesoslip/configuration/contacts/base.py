@@ -149,18 +149,24 @@ class ContactKind(ABC):
     def kernel_parameters(self, config: Setting) -> Parameters:
         """Parameters of the contacts in the kernel, in SI; forces and stiffness of one contact."""
 
-    def coarse_parameters(
+    def parameters_with(
         self,
         config: Setting,  # noqa: ARG002
-        coarsening: float,  # noqa: ARG002
+        resolution: float,  # noqa: ARG002
     ) -> Parameters | None:
-        """The same with longer steps; None where the numbers of a run do not depend on steps."""
+        """The same with a resolution; None where the numbers of a run do not depend on steps."""
         return None
 
     def problems(self, config: Setting, given: frozenset[str]) -> Complaints:
         """The combinations that this kind refuses, and the given keys that it does not answer."""
         complaints = list(self._problems(config))
         yield from complaints
+        if config.run.force_tolerance is not None and not self.step_work_bound > 0:
+            yield Complaint(
+                "run.force_tolerance",
+                'needs engine "me": contacts one by one have no steps, and no error of steps',
+                config.run.force_tolerance,
+            )
         if self.interaction is not None and "load" in given:
             yield Complaint(
                 "load",

@@ -31,8 +31,8 @@ class PopulationContacts(ContactKind):
     def kernel_parameters(self, config: Setting) -> Parameters:
         return common_parameters(config) | {"resolution": config.run.resolution}
 
-    def coarse_parameters(self, config: Setting, coarsening: float) -> Parameters:
-        return self.kernel_parameters(config) | {"resolution": coarsening * config.run.resolution}
+    def parameters_with(self, config: Setting, resolution: float) -> Parameters:
+        return self.kernel_parameters(config) | {"resolution": resolution}
 
     def _problems(self, config: Setting) -> Complaints:
         run = config.run

@@ -72,8 +72,8 @@ class Choice(NamedTuple):
 
 def chosen(every: Iterable[Level]) -> Choice:
     """The smallest minimum fall at which slips stand out, of the median with the longest plateau of
-    those that find about as many; on the plateau, from which on their number is constant, if it is
-    anywhere."""
+    those that find about as many; on the plateau, the smallest one from which their number is
+    constant over a factor of 1.5, or over the widest range."""
     best = max((_at(level) for level in every), key=_persistence)
     if best.counts.plateau is None:
         return best
@@ -82,10 +82,9 @@ def chosen(every: Iterable[Level]) -> Choice:
     threshold, count = best.counts.threshold[inside], best.counts.count[inside]
     starts = np.flatnonzero(np.diff(count, prepend=-1))
     ends = np.append(starts[1:], count.size) - 1
-    constant = starts[threshold[ends] >= MIN_PLATEAU * threshold[starts]]
-    if constant.size == 0:
-        return best
-    min_fall = float(threshold[constant[0]])
+    ratio = threshold[ends] / threshold[starts]
+    is_wide = ratio >= min(MIN_PLATEAU, float(ratio.max()))
+    min_fall = float(threshold[starts[np.argmax(is_wide)]])
     tops, bottoms = best.level.slips(min_fall)
     return best._replace(min_fall=min_fall, tops=tops, bottoms=bottoms)
 

@@ -145,7 +145,7 @@ def test_views_are_complete():
     assert set(OUTPUTS) == {view.kind for view in VIEWS}
     for kind in OUTPUTS:
         assert names_of_views(kind)[0] == kind
-    options = {"realization", "start, end", "x", "snapshot", "measure"}
+    options = {"realization", "start, end", "x", "snapshot", "measure", "period"}
     for view in VIEWS:
         assert view.options <= options, view.name
         assert view.compare_all is None or view.compare_panel is not None, view.name

@@ -254,6 +254,30 @@ def test_rate_and_state_are_those_of_a_velocity_step_of_cohorts(velocity, ageing
     assert found.slip_distance == pytest.approx(area / (found.a - net), rel=0.04)
 
 
+@pytest.mark.parametrize(("ratio", "velocity"), [(0.1, 1e-18), (1.0, 1e-12), (1e6, 1e-9)])
+def test_steady_force_far_below_thresholds_is_that_of_constant_rates(ratio, velocity):
+    """Contacts break at ω_0 exp(-f_s/f_T) each, with a normal law of thresholds."""
+    none = dict.fromkeys(("contacts.delay", "contacts.drag_rate", "contacts.back_force_ratio"), 0.0)
+    width = {"contacts.threshold.relative_width": 0.01}
+    config = klein_activated(1e2, ratio, None, **none, **width)
+    contacts = config.contacts
+    life = math.exp(1 / ratio) / 1e2 * math.exp(1.5 * (0.01 / ratio) ** 2)
+    force = contacts.static_force / contacts.break_stretch * velocity * life
+    assert contact_theory(config).steady_force(velocity) == pytest.approx(force, rel=1e-5)
+    slope = contact_theory(config).steady_slope(velocity)
+    assert slope == pytest.approx(force, rel=1e-5)
+
+
+def test_a_force_that_does_not_evolve_has_no_slip_distance(monkeypatch):
+    config = klein_activated(1e2, 0.1)
+    sliding = sliding_of(config)
+    monkeypatch.setattr(type(sliding), "slope", sliding.rate_and_state.a / sliding.velocity)
+    found = sliding_of(config).rate_and_state
+    assert found.b == 0
+    assert math.isnan(found.slip_distance)
+    assert "slip_distance" not in {one.name for one in contact_theory(config).quantities()}
+
+
 def test_the_critical_stiffness_divides_stable_from_unstable_springs():
     config = klein_activated(
         1e4, 0.1, {"law": "log", "time": 1e-3, "growth": 0.2}, **{"contacts.delay": 0.0}

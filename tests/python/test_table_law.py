@@ -171,6 +171,8 @@ def test_a_file_and_what_an_output_keeps(tmp_path):
         ("1\n2\n", "there is no header"),
         ("threshold,area\n1,1\n2,2\n", "remove one of them"),
         ("threshold,threshold\n1,1\n2,2\n", "two columns threshold"),
+        ("threshold\n1e308\n1.5e308\n", "must have a finite sum"),
+        ("threshold,weight\n1,1e308\n2,1e308\n", "weight must have a finite sum"),
         ("threshold\n1\nx\n", "line 3"),
         ("", "is empty"),
     ],

@@ -95,12 +95,16 @@ def sample_problem(
     wrong = [one for one in samples if not one > 0]
     if wrong:
         return "samples", f"must be positive: a threshold is {wrong[0]:g}"
+    if not math.isfinite(sum(samples)):
+        return "samples", "must have a finite sum"
     if weights is not None:
         if len(weights) != len(samples):
             return "weights", f"must have as many values as samples, {len(samples)}"
         wrong = [one for one in weights if one < 0]
         if wrong:
             return "weights", f"must not be negative: one is {wrong[0]:g}"
+        if not math.isfinite(sum(weights)):
+            return "weights", "must have a finite sum"
         if samples and not any(weights):
             return "weights", "must not all be 0"
     used = {

@@ -174,7 +174,8 @@ class ThermalTheory(ContactTheory):
             return
         yield quantity("direct_effect", found.a)
         yield quantity("evolution_effect", found.b)
-        yield quantity("slip_distance", found.slip_distance)
+        if math.isfinite(found.slip_distance):
+            yield quantity("slip_distance", found.slip_distance)
         mass = getattr(self.config.slider, "mass", None)
         if found.b > found.a and mass is not None and 0 < self.config.spring_stiffness < math.inf:
             yield quantity("critical_stiffness_estimate", found.critical_stiffness(speed, mass))

@@ -39,8 +39,9 @@ MAX_PANELS, MIN_PANELS, POINTS = 60, 12, 10
 LEFT_OUT = 1e-15
 # Hazards between which ages have a fine quadrature: below, all contacts survive, above, none.
 MIN_HAZARD, MAX_HAZARD = 1e-14, 40.0
-# Panels of the search for these ages, and maximum length of the fine ones, over f_T/(k v).
-SEARCH_PANELS, MAX_PANEL = 60, 1.0
+# Panels of the search for these ages, minimum number of searches, each in a part of the range, and
+# maximum length of the fine panels, over f_T/(k v).
+SEARCH_PANELS, MIN_SEARCHES, MAX_PANEL = 60, 3, 1.0
 # Panels over the ages in which young thresholds change.
 AGEING_PANELS = 36
 # Panels and points of the hazard in a hold of contacts that age.
@@ -185,7 +186,7 @@ class ThermalLives:
         broken = self.hazard * self.survival
         work_slope = static * (self.mean(self.stretch * broken) - self.work) + self._drag
         life_slope = self.mean(broken) - self.life
-        return work_slope / life - work * life_slope / life**2
+        return work_slope / life - work / life * (life_slope / life)
 
     @property
     def delay(self) -> float:
@@ -202,7 +203,7 @@ class ThermalLives:
         length = self.scale / self.speed
         # The middle of a panel has less than its mean rate: contacts are broken by the age found.
         first = np.linspace(0, 1, SEARCH_PANELS + 1) * np.ones_like(end)
-        for _ in range(3):
+        for number in itertools.count(1):
             ages = start + (end - start) * first
             steps = np.diff(ages, axis=1)
             middle = (ages[:, 1:] + ages[:, :-1]) / 2
@@ -214,6 +215,9 @@ class ThermalLives:
             end = np.where(
                 is_over[:, None], ages[rows, np.minimum(last + 2, SEARCH_PANELS)][:, None], end
             )
+            # Until it is known where in this range contacts break.
+            if number >= MIN_SEARCHES and not np.any(is_over & (last < SEARCH_PANELS // 4)):
+                break
         ages = np.linspace(0, 1, SEARCH_PANELS + 1) * end
         rates = self.rate_at(ages, self.back + self.speed * ages)
         rates = np.maximum.accumulate(rates, axis=1) * end

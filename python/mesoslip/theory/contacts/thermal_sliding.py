@@ -53,7 +53,8 @@ class RateAndStateTheory(NamedTuple):
     break before they reach their thresholds, and the drag of the detached ones: after a step of the
     velocity by a factor r contacts break at a force that is higher by f_T ln r. The evolution
     effect b [N] is a - dF/d ln v. The slip distance D_c [m] is the area between the evolving force
-    and its new steady value over the evolution of the force, for a small step.
+    and its new steady value over the evolution of the force, for a small step; NaN if the force
+    does not evolve.
     """
 
     a: float
@@ -197,9 +198,9 @@ class ThermalSliding(LinearStability):
         rate = SLOW / life
         here, twice = (self.response_at(one + 0j).real / one for one in (rate, 2 * rate))
         area = self.velocity**2 * float((twice - here) / rate)
-        return RateAndStateTheory(
-            a, a - net, (area + activated * self.velocity / self._breaking_rate) / (a - net)
-        )
+        evolving = area + activated * self.velocity / self._breaking_rate
+        # A force that does not evolve has no slip distance.
+        return RateAndStateTheory(a, a - net, evolving / (a - net) if a != net else math.nan)
 
     @cached_property
     def _search_path(self) -> Array | None:

@@ -24,7 +24,7 @@ module mesoslip_hazard
 
    !> Rate of breaking that is negligible [1/s], one in 300 000 years, and the minimum of the rate
    !> at the threshold over it: for slower contacts less is negligible
-   real(wp), parameter :: negligible_rate = 1.0e-13_wp, min_ratio = 1.0e20_wp
+   real(wp), parameter :: negligible_rate = 1.0e-13_wp, min_ratio = 1.0e14_wp
    !> Stretch over the mean breaking stretch at which the sign of a force changes: negligible, but
    !> larger than rounding errors; and maximum stretch at which it may count as changed, over that
    !> at breaking

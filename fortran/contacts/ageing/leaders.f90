@@ -18,8 +18,9 @@ module mesoslip_contacts_ageing_leaders
 
    public :: bound_leaders, break_leaders, gather_leaders, sort_leaders, add_leader, remove_leader
 
-   !> Contacts that are taken out of the queue together
-   integer, parameter :: max_gathered = 16
+   !> Contacts that are taken out of the queue together: minimum, as many as there are leaders, and
+   !> maximum, which narrow thresholds reach
+   integer, parameter :: min_gathered = 16, max_gathered = 1024
 
 contains
 
@@ -111,11 +112,12 @@ contains
       class(ageing_contacts_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
 
-      integer :: number, added, position, contact(max_gathered)
+      integer :: wanted, number, added, position, contact(max_gathered)
       real(wp) :: last
 
-      last = self%queue%first_key + max_gathered * self%stretch / self%parameters%count
-      do number = 1, max_gathered
+      wanted = max(min_gathered, min(max_gathered, self%list(leaders)%count))
+      last = self%queue%first_key + wanted * self%stretch / self%parameters%count
+      do number = 1, wanted
          if (self%queue%first_key > last) exit
          call self%queue%pop(self%record, contact(number))
       end do

@@ -239,13 +239,7 @@ def kinds_of_contacts() -> None:
             tables = Config.load(KLEIN, ["run.duration=4", "output.slip_interval=1ms"]).to_dict()
             tables["contacts"] |= {"coupling": "equal", **changes}
             if slider == "prescribed":
-                tables["slider"] = {"kind": "prescribed"}
-                tables["drive"]["velocity"] = 1e-6
-                tables["run"]["duration"] = 0.36
-                tables["output"] = {"interval": 0.36}
-                # Contacts that attach with another force have no steady start.
-                tables["contacts"]["initial"] = "uniform"
-                tables["contacts"]["threshold"]["relative_width"] = 0.1
+                prescribe(tables)
             configs[name] = Config.from_dict(tables)
         costs: dict[str, list[float]] = {name: [] for name in configs}
         advances: dict[str, float] = {}
@@ -266,6 +260,17 @@ def kinds_of_contacts() -> None:
                 met.append((f"{slider}, {name}", ratio, "<=", wanted, ""))
 
 
+def prescribe(tables: dict[str, Any]) -> None:
+    """Have the slider move steadily."""
+    tables["slider"] = {"kind": "prescribed"}
+    tables["drive"]["velocity"] = 1e-6
+    tables["run"]["duration"] = 0.36
+    tables["output"] = {"interval": 0.36}
+    # Contacts that attach with another force have no steady start.
+    tables["contacts"]["initial"] = "uniform"
+    tables["contacts"]["threshold"]["relative_width"] = 0.1
+
+
 def changing_load_cost() -> None:
     """Cost of an event under a vibrating load over that under a constant one."""
     print("\nCost of an event under a load of 50 uN that vibrates, 4080 contacts")
@@ -278,12 +283,7 @@ def changing_load_cost() -> None:
                 changes = ["run.duration=4", "output.slip_interval=1ms", "contacts.coupling=equal"]
                 tables = Config.load(KLEIN, changes).to_dict()
                 if slider == "prescribed":
-                    tables["slider"] = {"kind": "prescribed"}
-                    tables["drive"]["velocity"] = 1e-6
-                    tables["run"]["duration"] = 0.36
-                    tables["output"] = {"interval": 0.36}
-                    tables["contacts"]["initial"] = "uniform"
-                    tables["contacts"]["threshold"]["relative_width"] = 0.1
+                    prescribe(tables)
                 if amplitude:
                     cycle = {"amplitude": amplitude * 50e-6, "frequency": frequency}
                     tables["load"] = {"normal_force": 50e-6, "cycle": cycle}

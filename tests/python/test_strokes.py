@@ -536,6 +536,9 @@ def test_the_track_is_no_error_of_whole_revolutions() -> None:
         figure = mesoslip.plot(record_tree(time, force), view="strokes", period=period)
         places = figure.axes[1].containers[0].lines[0].get_xdata()
         assert len(places) == len(rows["mean_friction"])
+    for wrong in (math.nan, -1.0):
+        with pytest.raises(mesoslip.ConfigError, match=r"period = .*: must be positive"):
+            mesoslip.plot(record_tree(time, force), view="strokes", period=wrong)
 
 
 def strokes_of_made(number: int, tmp_path):

@@ -140,6 +140,8 @@ def plot(
     turn: float | Literal["auto"] | None = "auto"
     if period != "auto":
         turn = None if period is None else _quantity("period", period, "s", "0.92 s")
+        if turn is not None and not 0 < turn < math.inf:
+            raise ConfigError([Problem("", "period", "must be positive", period)])
     options = Options(extent, _whole("snapshot", snapshot), period=turn)
     if isinstance(width, str) and width in JOURNALS:
         journal = JOURNALS[width]

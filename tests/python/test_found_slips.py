@@ -373,6 +373,10 @@ def test_sudden_falls_end_where_they_have_fallen(noise):
     assert found.first.size >= 55
     assert np.mean(found.last - found.first <= 2) > 0.95
     assert np.abs((found.first + found.last) / 2 % 100 - 50).min() > 45
+    # Not less than the mean rate.
+    durations = 1e-3 * (found.last - found.first)
+    drops = found.force_before - found.force_after
+    assert (found.fall_rate >= drops / durations * (1 - 1e-9)).all()
     # A fall of half a sine in 20 samples.
     phase = at % 120
     slow = np.where(phase < 100, phase / 100, 0.5 + 0.5 * np.cos(np.pi * (phase - 100) / 20))

@@ -54,6 +54,18 @@ def test_a_realization_waits_for_no_slip_of_another(klein):
     np.testing.assert_array_equal(slips["waiting_time"].values[~is_first], expected)
 
 
+def test_a_reversed_drive_has_the_same_statistics(klein):
+    """Those of the mirrored motion."""
+    from mesoslip.analysis.slips import catalogue_of
+
+    changes = {"run__duration": 4.0, "contacts__count": 200}
+    trees = [mesoslip.run(klein(drive__velocity=v, **changes)) for v in (1e-7, -1e-7)]
+    forth, back = (catalogue_of(one).statistics for one in trees)
+    assert forth.keys() == back.keys()
+    for name, values in forth.items():
+        assert back[name] == pytest.approx(values, rel=1e-9), name
+
+
 def test_both_engines_have_one_catalogue(klein):
     """As long as their traces agree, of many contacts and of infinitely many."""
     changes = {"run__duration": 0.5, "contacts__count": 100_000, **STIFF}

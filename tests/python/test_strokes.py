@@ -627,6 +627,35 @@ def test_slips_in_strokes_are_those_of_the_slider(number, tmp_path):
     assert slips.sizes["slip"] > 0.8 * record.slips.size
 
 
+def test_statistics_of_slips_are_along_the_motion(tmp_path, command):
+    """Slips back and forth are alike; none waits for one in the other direction."""
+    stiffness, drop, phase = 3.0, 0.4, phases()
+    x = drive("triangle", phase)
+    force = stick_slip(x, stiffness, drop)
+    rows = np.transpose([phase, x, force + 1e-3 * np.random.default_rng(1).standard_normal(x.size)])
+    header = "time [s],load point [m],force [N]"
+    np.savetxt(tmp_path / "a.csv", rows, delimiter=",", header=header, comments="")
+    tree = mesoslip.read_trace(tmp_path / "a.csv", stiffness=stiffness)
+    slips = mesoslip.slips(tree)
+    back = slips["force_drop"].values < 0
+    assert 0.3 < back.mean() < 0.7
+    assert ((slips["peak_velocity"].values < 0) == back).all()
+    turned = np.flatnonzero(np.diff(back)) + 1
+    assert np.isnan(slips["waiting_time"].values[turned]).all()
+    tree.to_netcdf(tmp_path / "a.nc")
+    answer = json.loads(command.output("slips", tmp_path / "a.nc", "--json"))["statistics"]
+    speed = np.abs(np.diff(x)).mean() * SAMPLES
+    # A slip is loaded by one sample.
+    fall = drop - stiffness * speed / SAMPLES
+    assert answer["force_drop"]["mean"] == pytest.approx(fall, rel=0.03)
+    assert answer["force_drop"]["standard_deviation"] < 0.05 * drop
+    assert answer["force_before"]["minimum"] == pytest.approx(1, abs=0.05)
+    assert answer["loading_rate"]["mean"] == pytest.approx(stiffness * speed, rel=0.02)
+    period = drop / (stiffness * speed)
+    assert answer["waiting_time"]["maximum"] == pytest.approx(period, rel=0.1)
+    assert "backwards" in command.output("slips", tmp_path / "a.nc")
+
+
 def test_slips_before_a_rest_are_found(tmp_path):
     """The force rises faster after a reversal than it falls at rest: that is no mirrored slip."""
     record = made(3041)

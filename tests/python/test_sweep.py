@@ -171,6 +171,13 @@ def test_every_measure_of_a_run_with_known_slips():
     assert found.keys() == expected.keys()
     for name, value in expected.items():
         assert found[name] == pytest.approx(value, rel=0.02), name
+    # The last slip goes back: peaks and drops are along its motion, and nothing waits for it.
+    for name in ("force_before", "force_drop"):
+        slips[name] = slips[name] * [1, 1, -1]
+    run = RunView(xr.DataTree.from_dict({"/": root, "/slips": slips}), 2.0)
+    for name in ("mean_peak_force", "mean_force_drop"):
+        assert MEASURES[name].function(run) == pytest.approx(expected[name])
+    assert np.isnan(MEASURES["mean_waiting_time"].function(run))
 
 
 def test_regimes_are_those_of_the_run_itself(tmp_path):

@@ -69,6 +69,11 @@ HEADS = {
 }
 # Printed columns that have statistics only.
 STATISTICS_ONLY = {*STICK_COLUMNS} - {"creep_share"}
+# Columns with the sign of the motion in a slip.
+SIGNED = {
+    *("force_before", "force_after", "force_drop", "peak_velocity", "friction_coefficient"),
+    "loading_rate",
+}
 # Significant digits of the largest number of a column, and of standard deviations.
 DIGITS, DEVIATION_DIGITS = 5, 2
 
@@ -101,15 +106,25 @@ class Catalogue:
         return rows_of({name: one.values for name, one in self.columns.items()})
 
     @property
+    def goes_back(self) -> bool:
+        """Whether there are slips against the positive direction."""
+        return bool(np.any(self.columns["force_drop"].values < 0))
+
+    def along_motion(self, name: str) -> NDArray[Any]:
+        """The values of a column, positive along the motion in each slip."""
+        values, drops = self.columns[name].values, self.columns["force_drop"].values
+        return np.where(drops < 0, -values, values) if name in SIGNED else values
+
+    @property
     def statistics(self) -> dict[str, dict[str, float]]:
         """Number of slips, with the first; mean, standard deviation, minimum and maximum of each
-        column, in SI."""
+        column along the motion, in SI."""
         count = float(len(self.columns["start_time"].values))
         result: dict[str, dict[str, float]] = {"slips": {"count": count}}
         for name in (*COLUMNS[3:], *LOAD_COLUMNS):
             if name not in self.columns:
                 continue
-            values = self.columns[name].values
+            values = self.along_motion(name)
             values = values[np.isfinite(values)]
             if values.size:
                 result[name] = {
@@ -185,15 +200,17 @@ def catalogue_of(tree: Tree, realization: int | None = None) -> Catalogue:
         start, end = np.searchsorted(rows, (realization, realization + 1))
         data = data.isel(slip=slice(int(start), int(end)))
     start, owners = data["start_time"].values, data["realization_index"].values
-    waiting = np.diff(start, prepend=np.nan)
-    if start.size:
-        waiting[np.diff(owners, prepend=-1) != 0] = np.nan
     apparatus = apparatus_of(tree)
     added = {
         "duration": data["end_time"].values - start,
-        "waiting_time": waiting,
+        "waiting_time": np.diff(start, prepend=np.nan),
         **_stick_columns(tree, data, apparatus),
     }
+    # Between slips in opposite directions the drive turns, and the slider does not only stick.
+    is_back = data["force_drop"].values < 0
+    is_first = (np.diff(owners, prepend=-1) != 0) | np.diff(is_back, prepend=False)
+    for name in ("waiting_time", *STICK_COLUMNS[:-1]):
+        added[name][is_first] = np.nan
     columns = {
         name: Column(added[name], *ADDED[name]) if name in added else _column(data, name)
         for name in _columns_of(data)
@@ -235,10 +252,11 @@ def slips(output: OutputLike) -> Dataset:
     xarray.Dataset
         The group ``slips`` of the output with the coordinate ``realization_index``, the
         ``duration``, and the ``waiting_time`` since the start of the slip before, NaN for the first
-        slip of a realization. The stick phase before a slip (`mesoslip.analysis.stick_phases`) has
-        a ``stick_duration``, ``loading_rate``, ``loading_stiffness``, ``creep_displacement`` and
-        ``creep_share``; ``peak_fall_rate`` is the maximum rate at which the force fell. Forces of a
-        measured friction coefficient have the unit 1.
+        slip of a realization or after a reversal. The stick phase before a slip
+        (`mesoslip.analysis.stick_phases`) has a ``stick_duration``, ``loading_rate``,
+        ``loading_stiffness``, ``creep_displacement`` and ``creep_share``; ``peak_fall_rate`` is the
+        maximum rate at which the force fell. Forces of a measured friction coefficient have the
+        unit 1.
 
     Raises
     ------

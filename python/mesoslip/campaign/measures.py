@@ -151,19 +151,21 @@ def force_amplitude(run: RunView) -> float:
     return float(np.ptp(forces) / 2) if forces.size else np.nan
 
 
-@measure("N", "mean spring force at the start of slips")
+@measure("N", "mean spring force at the start of slips, along their motion")
 def mean_peak_force(run: RunView) -> float:
-    return _mean(run.catalogue("slips", "force_before"))
+    before = run.catalogue("slips", "force_before")
+    return _mean(np.where(run.catalogue("slips", "force_drop") < 0, -before, before))
 
 
-@measure("N", "mean drop of the force")
+@measure("N", "mean drop of the force, along the motion")
 def mean_force_drop(run: RunView) -> float:
-    return _mean(run.catalogue("slips", "force_drop"))
+    return _mean(np.abs(run.catalogue("slips", "force_drop")))
 
 
 @measure("s", "mean time between starts of slips")
 def mean_waiting_time(run: RunView) -> float:
-    return _mean(np.diff(run.catalogue("slips", "start_time")))
+    is_back = run.catalogue("slips", "force_drop") < 0
+    return _mean(np.diff(run.catalogue("slips", "start_time"))[is_back[1:] == is_back[:-1]])
 
 
 @measure("s", "mean duration of slips")

@@ -68,6 +68,10 @@ def slips(output: OutputArgument, table: TableOption = None, as_json: JsonOption
         statistics = catalogue.printed_statistics()
         typer.echo("")
         print_table((statistics.head, *statistics.rows))
+        if catalogue.goes_back:
+            typer.echo(
+                "slips backwards have negative forces; statistics are along the motion of each slip"
+            )
     if counts is not None:
         _print_counts(counts, catalogue.force_unit)
 

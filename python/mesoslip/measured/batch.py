@@ -139,8 +139,8 @@ def _statistics(tree: Any) -> Iterator[tuple[str, Any]]:
     drops, waits = (catalogue[one].values for one in ("force_drop", "waiting_time"))
     yield "slips", drops.size
     if drops.size:
-        yield "mean_force_drop", float(np.mean(drops))
-    if drops.size > 1:
+        yield "mean_force_drop", float(np.mean(np.abs(drops)))
+    if np.isfinite(waits).any():
         yield "mean_waiting_time", float(np.nanmean(waits))
 
 

@@ -19,17 +19,18 @@ def slip_group(
 ) -> Dataset:
     """The catalogue of slips in the unit of the force, "N" or "1", with peak velocities if drive
     and stiffness are known."""
-    speed = np.full(len(found), np.nan)
+    drop = found.force_before - found.force_after
+    peak = np.full(len(found), np.nan)
     if stiffness is not None and 0 < stiffness < math.inf and velocity is not None:
-        speed = found.fall_rate / stiffness + abs(velocity)
+        peak = np.copysign(found.fall_rate / stiffness + abs(velocity), drop)
     columns = {
         "realization_index": np.zeros(len(found), dtype=np.int64),
         "start_time": found.start_time,
         "end_time": found.end_time,
         "force_before": found.force_before,
         "force_after": found.force_after,
-        "force_drop": found.force_before - found.force_after,
-        "peak_velocity": speed,
+        "force_drop": drop,
+        "peak_velocity": peak,
         "contacts_broken": np.full(len(found), np.nan),
         "peak_fall_rate": found.fall_rate,
     }

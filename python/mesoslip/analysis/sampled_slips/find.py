@@ -221,6 +221,8 @@ def find_slips(
     tops, last = level.on_samples(cleaned, tops, bottoms)
     half = level.half_samples(tops, period)
     first, last, before, after = ends_of(time, cleaned, tops, last, sigma, half)
+    # A line over samples is flatter than a fall of one or two.
+    rates = np.maximum(rates, (before - after) / (time[last] - time[first]))
     return FoundSlips(
         time[first],
         time[last],

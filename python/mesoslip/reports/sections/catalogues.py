@@ -122,7 +122,7 @@ def _histograms(subjects: Sequence[Subject], catalogues: Sequence[Catalogue]) ->
     panels = figure.subplots(1, len(DISTRIBUTIONS))
     for axes, name in zip(panels, DISTRIBUTIONS, strict=True):
         header, unit = _columns(catalogues[0])[name]
-        all_values = [one.columns[name].values for one in catalogues]
+        all_values = [one.along_motion(name) for one in catalogues]
         all_values = [values[np.isfinite(values)] for values in all_values]
         scale = scale_for(max_size(*all_values), unit)
         together = np.concatenate(all_values) / scale.size

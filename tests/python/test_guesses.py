@@ -75,14 +75,24 @@ WRONG = {
         {"part": 1},
         lambda guessed, right: (guessed.time.size, right.time.size) == (25, 15),
     ),
+    "samples even in time along the path of the load point": (
+        ("piezo position [nm],force [N]", PATH, FORCE),
+        "guess: samples are even in time, at 10 Hz, as the load point moves by 7.8 nm at 2 nm/s",
+        {"rate": "20 Hz"},
+        lambda guessed, right: guessed.time[-1] == pytest.approx(3.9) == 2 * right.time[-1],
+    ),
 }
+# Options that a file needs to be read at all.
+NEEDED = {"samples even in time along the path of the load point": {"velocity": "2 nm/s"}}
 
 
 @pytest.mark.parametrize("name", WRONG)
 def test_a_wrong_guess_is_printed_and_overruled(name, tmp_path):
     columns, text, options, is_right = WRONG[name]
     path = file_of(tmp_path / "a.csv", *columns)
-    guessed, right = understand(path).record, understand(path, **options).record
+    needed = NEEDED.get(name, {})
+    guessed = understand(path, **needed).record
+    right = understand(path, **needed, **options).record
     assert any(line.startswith(text) for line in guessed.report), guessed.report
     assert not any("guess:" in line for line in right.report), right.report
     assert is_right(guessed, right)

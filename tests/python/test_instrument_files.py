@@ -68,6 +68,11 @@ TRACTION = (
 ROCK = "Time(s)\tDispl(microns)\tShear_stress(MPa)\tNormal_stress(MPa)\n" + rows(
     TIME, 1e3 * X, FORCE, LOAD + 0 * X
 )
+MARKED = "# run 1\nTime\tLP_Disp\tShear_Stress\tNormal_Stress\n#\tmicron\tMPa\tMPa\n" + rows(
+    TIME, 1e3 * X, FORCE, LOAD + 0 * X
+)
+# 10 um in half a second.
+SCANNED = "Piezo position (um)\tLateral force (N)\n" + rows(1e3 * X, FORCE)
 MTS = (
     "MTS793|BTW|ENU|1|2|.|:|1|0|0|A\n\nData Acquisition: Timed\nStation Name: Shear.cfg\n\n"
     "Time\tShear Displacement\tShear Force\tNormal Force\nSec\tmm\tkN\tkN\n"
@@ -118,6 +123,8 @@ TEXTS = {
     "pin on disc (decimal commas, preamble)": (TRIBOMETER, {}),
     "Bruker UMT": (UMT, {}),
     "PCS traction machine": (TRACTION, {}),
+    "double direct shear, marked units": (MARKED, {"area": "1 mm^2"}),
+    "lateral force over a piezo's position": (SCANNED, {"velocity": "20 um/s"}),
     "double direct shear (BRAVA)": (ROCK, {"area": "1 mm^2"}),
     "MTS TestSuite": (MTS, {}),
 }  # fmt: skip

@@ -240,6 +240,10 @@ def test_damaged_files_give_no_wrong_numbers(tmp_path, number):
         ("DAQ.Fx (N)", "force", "N"),
         ("Ff (N)", "force", "N"),
         ("DAQ.COF", "friction", None),
+        ("F_lat(µN)", "force", "uN"),
+        ("Piezo position (nm)", "load_point", "nm"),
+        ("angle (°)", "revolutions", "°"),
+        ("angle", None, None),
     ],
 )
 def test_headers_of_the_field(header, quantity, unit):

@@ -427,6 +427,13 @@ def test_revolutions_of_a_disc() -> None:
     assert "groups of 4 revolutions" in found.attrs["notes"]
     with pytest.raises(mesoslip.FileError, match="whole revolutions"):
         mesoslip.strokes(record_tree(time[::300], force[::300], revolutions=0.8 * time[::300]))
+    # Of a gap there are no rows, nor of parts beside it; the force may be against the motion.
+    kept = (time < 4.3) | (time > 8.1)
+    found = mesoslip.strokes(record_tree(time[kept], -force[kept], revolutions=0.8 * time[kept]))
+    rows = found["strokes"]
+    assert rows.sizes["stroke"] == 5
+    assert (rows["mean_friction"].values > 1.9).all()
+    assert (rows["end_time"] - rows["start_time"]).values.max() < 1.3
     for period in (1e-30, 0.0199):
         with pytest.raises(mesoslip.FileError, match="shorter than two samples, 20 ms"):
             mesoslip.strokes(record_tree(time, force), period=period)
@@ -462,6 +469,38 @@ def test_a_file_of_a_disc(tmp_path) -> None:  # type: ignore[no-untyped-def]
     assert {"friction_coefficient", "revolutions"} <= set(tree.data_vars)
     found = mesoslip.strokes(tree)
     np.testing.assert_allclose(found["cycles"]["mean_friction"], 0.201, atol=1e-3)
+
+
+@pytest.mark.parametrize(("unit", "size"), [("deg", 360.0), ("rad", math.tau), ("rev", 1.0)])
+def test_a_disc_that_turns_back_and_forth_has_strokes(tmp_path, unit, size) -> None:  # type: ignore[no-untyped-def]
+    """Along the path at the radius, by an angle in any unit; without a radius by the force."""
+    rng = np.random.default_rng(1)
+    x = drive("triangle", phases())
+    force = elastic_sliding(x) + 0.01 * rng.standard_normal(x.size)
+    rows = np.transpose([phases(), 0.25 * size * x, force])
+    file = tmp_path / "disc.csv"
+    header = f"time [s],angle [{unit}],friction force [N]"
+    np.savetxt(file, rows, delimiter=",", header=header, comments="")
+    tree = mesoslip.read_trace(file, radius="20 mm")
+    found = strokes_of(tree)
+    lengths = found.columns["strokes"]["length"]
+    np.testing.assert_allclose(lengths, 0.5 * math.tau * 0.02, rtol=1e-3)
+    # The angle of 0.25 revolutions is the unit of the drive.
+    unit_length = 0.25 * math.tau * 0.02
+    stiffness = found.overall["stiffness"]
+    assert stiffness.mean == pytest.approx(20 / unit_length, abs=4 * stiffness.error)
+    guessed = mesoslip.read_trace(file)
+    assert "strokes by it need a --radius" in guessed.attrs["understood"]
+    assert strokes_of(guessed).source == "sign of the force"
+
+
+def test_an_angle_that_starts_again_counts_revolutions(tmp_path) -> None:  # type: ignore[no-untyped-def]
+    time = np.arange(0, 20, 0.01)
+    rows = np.transpose([time, 360 * (0.8 * time % 1), 2 + 0.1 * np.sin(math.tau * 0.8 * time)])
+    header = "time [s],angle [deg],friction force [N]"
+    np.savetxt(tmp_path / "disc.csv", rows, delimiter=",", header=header, comments="")
+    found = mesoslip.strokes(mesoslip.read_trace(tmp_path / "disc.csv"))
+    assert found["strokes"].sizes["stroke"] == 15
 
 
 def test_a_given_motion_overrules_the_guess() -> None:

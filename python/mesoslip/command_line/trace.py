@@ -67,7 +67,10 @@ def trace(
         ),
     ] = None,
     velocity: Annotated[
-        str | None, option("Velocity of the drive, if no load point was recorded", "'42 um/s'")
+        str | None,
+        option(
+            "Velocity of the drive, without a column of the load point or of times", "'42 um/s'"
+        ),
     ] = None,
     stiffness: Annotated[
         str | None,

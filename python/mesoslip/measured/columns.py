@@ -51,6 +51,8 @@ OTHER_NAMES = {
     "drive_displacement": "load_point",
     "friction_coefficient": "friction",
     "mu": "friction",
+    "rotation": "revolutions",
+    "angle": "revolutions",
 }
 # Examples of factors of columns of a voltage, by SI unit.
 EXAMPLE_FACTORS = {
@@ -155,11 +157,12 @@ def _described(table: Table, name: str, column: Column, guesses: list[str]) -> U
     index = _index_of(table, column.column)
     heading = read_header(table.headers[index], table.units[index])
     unit = plain(column.unit if column.unit is not None else heading.unit or "")
-    si = QUANTITIES[name]
     if column.factor is None:
         size, guess = _size(unit, name, table.headers[index])
         guesses += [guess] if guess else []
         return Used(index, unit or _assumed(name), size, _offset(column.offset, unit))
+    # Pure numbers of revolutions.
+    si = QUANTITIES[name].replace("rev", "1")
     factor, unit = _factor(column.factor, unit, si)
     return Used(index, unit, factor, _offset(column.offset, unit))
 
@@ -195,7 +198,7 @@ def _names(headers: Sequence[str]) -> str:
 def _size(unit: str, quantity: str, header: str) -> tuple[float, str]:
     """Size of a unit, and doubts about it; a ValueError if it has another dimension."""
     si, right = QUANTITIES[quantity], f"write it as {EXAMPLES[quantity]!r}"
-    if not unit and si in {"1", "V"}:
+    if not unit and si in {"1", "rev", "V"}:
         return 1.0, ""
     if not unit and quantity == "time":
         return 1.0, f"{shown(header)} has no unit: taken as seconds"

@@ -18,7 +18,7 @@ QUANTITIES = {
     "normal_stress": "Pa",
     "load_point": "m",
     "displacement": "m",
-    "revolutions": "1",
+    "revolutions": "rev",
     "rotation_speed": "1/s",
     "torque": "N*m",
     "radius": "m",
@@ -28,6 +28,8 @@ QUANTITIES = {
 }
 # A displacement, of the load point or of the slider.
 EITHER = "either"
+# An angle, which is a number of revolutions if it has a unit.
+ANGLE = "angle"
 
 # Names of the field, in lower case, without punctuation.
 NAMES = {
@@ -37,7 +39,9 @@ NAMES = {
     "force": "force|spring force|shear force|shear load|friction force|frictional force"
     "|lateral force|tangential force|horizontal force|pulling force|traction force|drive force"
     "|driving force|kraft|reibkraft|standardkraft|ft|f t|ff|f f|fx|f x|f|fs|force x|force t"
-    "|force tangential|horizontal load|force de frottement|force tangentielle",
+    "|force tangential|horizontal load|force de frottement|force tangentielle|f lat|flat"
+    "|lateral|f lateral|f shear|f fric|ffric|f friction|f tan|ftan|f tangential|force lateral"
+    "|force friction|force shear|tangential",
     "shear_stress": "shear|shear stress|shearstress|tau|τ|shear strs|stress shear",
     "friction": "friction|friction coefficient|coefficient of friction|friction coeff"
     "|friction coef|coef of friction|coeff of friction|cof|mu|f mg|f over mg|f over n|f fn"
@@ -55,11 +59,14 @@ NAMES = {
     "|actuator displacement|actuator position|motor position|motor displacement"
     "|ram displacement|piston displacement|crosshead|crosshead displacement|carriage position"
     "|translation stage|puller position|driver position|drive disp|shear actuator displacement"
-    "|extension|standardweg",
+    "|extension|standardweg|piezo position|piezo displacement|piezo travel|scanner position"
+    "|scanner displacement|scan position|scan displacement|stage pos|drive pos|lp pos|lp position",
     "displacement": "slider displacement|slider position|block displacement|block position"
     "|sample displacement|slider|fault slip|slip displacement|slip|slider disp",
     "revolutions": "revolutions|total revolutions|number of revolutions|revolution count|revs"
     "|turns",
+    ANGLE: "angle|rotation|rotation angle|angle of rotation|angular position|disc angle|disk angle"
+    "|angular displacement|drehwinkel|winkel",
     "rotation_speed": "rotation speed|rotational speed|speed of rotation|spindle speed"
     "|rotation frequency|rpm|drehzahl|angular velocity|angular speed",
     "viscosity": "viscosity|dynamic viscosity|viskosit t|viscosit|viscosidad|eta",
@@ -71,7 +78,8 @@ NAMES = {
     "|surface speed|surface velocity|entrainment speed|rolling speed|gleitgeschwindigkeit"
     "|geschwindigkeit|load point velocity|lp velocity|drive velocity|slip rate",
     EITHER: "displacement|displ|disp|position|pos|x|distance|travel|stroke|horizontal displacement"
-    "|shear displacement|weg|deplacement|horizontal disp|shear disp|x position",
+    "|shear displacement|weg|deplacement|horizontal disp|shear disp|x position|lateral position"
+    "|lateral displacement|sliding distance|track position",
 }  # fmt: skip
 # Quantities of names by the dimension of their unit, which tells forces from stresses.
 BY_UNIT = {
@@ -88,6 +96,7 @@ LIKE = {
     "rotation_speed": "speed",
     "sliding_speed": "speed",
 }
+DIMENSIONS = QUANTITIES | {EITHER: "m", ANGLE: "rev"}
 MEANINGS = {name: quantity for quantity, names in NAMES.items() for name in names.split("|")}
 
 BRACKETS = re.compile(r"\[([^\]]*)\]|\(([^)]*)\)|\{([^}]*)\}|<([^>]*)>")
@@ -143,6 +152,9 @@ def bare_name(header: str) -> str:
 
 def _by_unit(found: Heading) -> Heading:
     """A meaning that agrees with the unit."""
+    if found.quantity == ANGLE:
+        is_known = bool(found.unit) and _has_dimension(found.unit or "", DIMENSIONS[ANGLE])
+        return found._replace(quantity="revolutions" if is_known else None)
     if found.quantity not in LIKE or not found.unit:
         return found
     for si, quantity in BY_UNIT[LIKE[found.quantity]].items():
@@ -186,7 +198,7 @@ def _without_brackets(text: str) -> str:
 
 def _fits(unit: str, quantity: str) -> bool:
     """Whether a unit is one of a quantity."""
-    return _has_dimension(unit, QUANTITIES.get(quantity, "m"))
+    return _has_dimension(unit, DIMENSIONS[quantity])
 
 
 def _has_dimension(unit: str, si: str) -> bool:

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from mesoslip.analysis.strokes import monotone_pieces, path_of
 from mesoslip.array_types import Array
 from mesoslip.errors import FileError, shown
 from mesoslip.measured.columns import FORCES, Assignment, Used, assign, values_of
@@ -88,6 +89,7 @@ def read_record(paths: Sequence[Path], trace: TraceDescription) -> Record:
         if missing.any():
             values[name] = np.where(missing, np.nan, values[name])
         notes += [note] if note else []
+    described = _column_report(table, columns, values)
     try:
         made = _force(values, trace)
         notes += _complete(values, made, trace)
@@ -99,7 +101,9 @@ def read_record(paths: Sequence[Path], trace: TraceDescription) -> Record:
         time, moved = continued(values["time"], tables, columns.used["time"].index)
         notes += moved
     else:
-        time = np.arange(len(table.lines)) / (trace.si("rate") or 1.0)
+        rate, guess = _rate(values, trace)
+        columns.guesses += guess
+        time = np.arange(len(table.lines)) / rate
     _check_span(time, trace)
     inside = _inside(time, trace)
     whole = np.isfinite(time) & np.isfinite(force)
@@ -137,7 +141,7 @@ def read_record(paths: Sequence[Path], trace: TraceDescription) -> Record:
     if inside.sum() < len(inside):
         outside = int((~inside).sum())
         notes.append(f"left out, before start or after end: {outside} of {inside.size}")
-    before = [*_column_report(table, columns, values), made.line]
+    before = [*described, made.line]
     after = [*notes, *(f"guess: {one}" for one in columns.guesses)]
     return Record(
         order.time,
@@ -217,10 +221,12 @@ def _check_needed(table: Table, columns: Assignment, trace: TraceDescription) ->
             f"(MPa)' or 'friction'; its other columns are {names}; say what they are with "
             "--columns, or in [trace.columns] of an EXPERIMENT.toml"
         )
-    if "time" not in used and rate is None:
+    has_rate = rate is not None or ("load_point" in used and trace.si("velocity"))
+    if "time" not in used and not has_rate:
         raise FileError(
             f"{table.path}: has no column of the time, such as 'time [s]'; its other columns are "
-            f"{names}; say what they are with --columns, or give a sampling rate with --rate"
+            f"{names}; say what they are with --columns, or give a sampling rate with --rate, or "
+            "for a column of the load point its speed with --velocity"
         )
 
 
@@ -249,6 +255,23 @@ class Force(NamedTuple):
         return None if self.normal is None else float(np.nanmean(self.normal))
 
 
+def _rate(values: dict[str, Array], trace: TraceDescription) -> tuple[float, list[str]]:
+    """Sampling rate of a file without times [Hz]: given, or a guess by the path of the load point
+    at its velocity."""
+    given = trace.si("rate")
+    if given is not None:
+        return given, []
+    position, velocity = values["load_point"], abs(trace.si("velocity") or 0.0)
+    path = path_of(position)
+    if not path > 0:
+        raise FileError("the load point does not move: give a sampling rate with --rate")
+    rate = velocity * (len(position) - 1) / path
+    return rate, [
+        f"samples are even in time, at {with_unit(rate, 'Hz')}, as the load point moves by "
+        f"{with_unit(path, 'm')} at {with_unit(velocity, 'm/s')} (--rate)"
+    ]
+
+
 def _complete(values: dict[str, Array], made: Force, trace: TraceDescription) -> list[str]:
     """Add the quantities that follow from others, and lines about them."""
     lines = []
@@ -261,7 +284,30 @@ def _complete(values: dict[str, Array], made: Force, trace: TraceDescription) ->
             f"sliding speed: 2 pi x radius ({_mean(radius, 'm')}) x rotation speed, "
             f"{_range(values['sliding_speed'], 'sliding_speed')}"
         )
+    if "revolutions" in values:
+        lines += _turned(values, radius)
     return lines
+
+
+def _turned(values: dict[str, Array], radius: Array | float | None) -> list[str]:
+    """Unwrap an angle that starts again after each revolution, and make a rotation back and forth
+    the motion of a load point; lines about it."""
+    turned = values["revolutions"]
+    known = np.isfinite(turned)
+    if known.any() and np.ptp(turned[known]) <= 1 and np.abs(np.diff(turned[known])).max() > 0.5:
+        values["revolutions"] = turned.copy()
+        values["revolutions"][known] = np.unwrap(turned[known], period=1)
+        return ["revolutions: of an angle that starts again after each one"]
+    if "load_point" in values or monotone_pieces(turned) is None:
+        return []
+    del values["revolutions"]
+    if radius is None:
+        return ["guess: the rotation goes back and forth; strokes by it need a --radius"]
+    values["load_point"] = math.tau * radius * turned
+    return [
+        f"load point: 2 pi x radius ({_mean(radius, 'm')}) x revolutions, as they go back and "
+        f"forth, {_range(values['load_point'], 'load_point')}"
+    ]
 
 
 def _radius(values: dict[str, Array], trace: TraceDescription) -> Array | float | None:
@@ -358,12 +404,17 @@ def _column_report(table: Table, columns: Assignment, values: dict[str, Array]) 
     return lines
 
 
+def _si(name: str) -> str:
+    """SI unit in print, of revolutions that of pure numbers."""
+    return QUANTITIES[name].replace("rev", "1")
+
+
 def _in_words(name: str) -> str:
     return "slider displacement" if name == "displacement" else name.replace("_", " ")
 
 
 def _scale(name: str, used: Used) -> str:
-    unit = QUANTITIES[name]
+    unit = _si(name)
     if unit == "1":
         text = "" if used.size == 1 else f", each {number(used.size, 6)}"
     else:
@@ -377,7 +428,7 @@ def _range(values: Array, name: str) -> str:
     known = values[np.isfinite(values)]
     if known.size == 0:
         return "no number"
-    unit = QUANTITIES[name]
+    unit = _si(name)
     low, high = float(known.min()), float(known.max())
     if name == "time":
         return f"{low:.10g} to {high:.10g} s"

@@ -19,7 +19,7 @@ from mesoslip.analysis.strokes import (
     are_of_track,
     back_and_forth,
     find_slips_between_reversals,
-    monotone_pieces,
+    path_of,
     record_pieces,
 )
 from mesoslip.array_types import Array, DataTree
@@ -277,9 +277,7 @@ def _comments(force: Array, noise: float, period: float) -> Iterator[str]:
 def _mean_speed(time: Array, drive: Array) -> float:
     """Mean speed of a drive that goes back and forth [m/s]."""
     known = np.flatnonzero(np.isfinite(drive))
-    pieces = monotone_pieces(drive[known]) or ()
-    path = sum(abs(float(drive[known[one.after - 1]] - drive[known[one.first]])) for one in pieces)
-    return path / float(time[known[-1]] - time[known[0]])
+    return path_of(drive) / float(time[known[-1]] - time[known[0]])
 
 
 def _as_measured(config: Config, record: Record, title: str) -> Config:

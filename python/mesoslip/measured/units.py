@@ -28,6 +28,8 @@ WORDS = {
     "volt": "V", "volts": "V", "millivolt": "mV", "millivolts": "mV",
     "hertz": "Hz", "percent": "%", "%": "%", "rpm": "rpm",
     "1/min": "rpm", "min-1": "rpm", "u/min": "rpm", "rev/min": "rpm", "r/min": "rpm",
+    "rev": "rev", "rad": "rad", "radian": "rad", "radians": "rad",
+    "deg": "deg", "degree": "deg", "degrees": "deg", "°": "deg",
     "rad/s": "rad/s", "rad s-1": "rad/s", "deg/s": "deg/s", "rev/s": "Hz", "rps": "Hz",
 }  # fmt: skip
 # Symbols, whose case matters, except those without another meaning.
@@ -59,6 +61,9 @@ SIZES = {
     "rpm": (1 / 60, "1/s"),
     "rad/s": (1 / math.tau, "1/s"),
     "deg/s": (1 / 360, "1/s"),
+    "rev": (1.0, "rev"),
+    "rad": (1 / math.tau, "rev"),
+    "deg": (1 / 360, "rev"),
     "V": (1.0, "V"),
     "mV": (1e-3, "V"),
     "uV": (1e-6, "V"),
@@ -137,7 +142,7 @@ def size_of(text: str, unit: str) -> Size | None:
     if name in WEIGHTS and unit == "N":
         return Size(WEIGHTS[name], f"{name} taken as a weight, {WEIGHTS[name]:g} N each")
     if name == "1":
-        return Size(1.0) if unit == "1" else None
+        return Size(1.0) if unit in {"1", "rev"} else None
     return _by_pint(name, unit)
 
 

@@ -15,6 +15,7 @@ from mesoslip.analysis.strokes.segments import (
     back_and_forth,
     monotone_pieces,
     output_pieces,
+    path_of,
     pieces_of_force,
     record_pieces,
 )
@@ -37,6 +38,7 @@ __all__ = [
     "has_rotation",
     "monotone_pieces",
     "output_pieces",
+    "path_of",
     "pieces_of_force",
     "place_of",
     "record_pieces",

@@ -25,6 +25,8 @@ from mesoslip.quantities import with_unit
 MIN_CORRELATION = 0.3
 # Minimum number of samples of a row.
 MIN_SAMPLES = 20
+# Maximum distance of samples in a row, over its time.
+MAX_GAP = 0.2
 COUNT, SPEED = "revolutions", "rotation_speed"
 # Falls of the track: minimum number, maximum number that is compared, minimum duration over the
 # time between them, and minimum coherence with the rotation, whose speed may be wrong by a share,
@@ -57,7 +59,8 @@ def revolutions_of(
             f"{name}: has {turned:.3g} revolutions by the {source}, with {per_revolution:.3g} "
             f"samples each; a mean needs whole revolutions with {MIN_SAMPLES} samples"
         )
-    pieces = tuple(Piece(*ends, 1) for ends in pairwise([0, *at, record.time.size]))
+    first, *rest = (Piece(*ends, 1) for ends in pairwise([0, *at, record.time.size]))
+    pieces = (first, *(one for one in rest[:-1] if _is_whole(record.time, one)), rest[-1])
     speed = turned / float(record.time[-1] - record.time[0])
     remarks = [
         f"{turned:.6g} revolutions at {60 * speed:.4g} rpm on average, {per_revolution:.3g} "
@@ -73,7 +76,7 @@ def revolutions_of(
     noun = "revolutions" if each == 1 else f"groups of {each} revolutions"
     record = record_in(tree, realization, pieces, source, noun, tuple(remarks))
     track = _of_track(record, angle) if each == 1 else np.zeros_like(angle)
-    rows = [_row(record, one, track[one.samples]) for one in pieces[1:-1] if one.size > 1]
+    rows = [_row(record, one, track[one.samples]) for one in pieces[1:-1]]
     return record, rows, [_as_cycle(one) for one in rows]
 
 
@@ -184,6 +187,15 @@ def are_of_track(slips: FoundSlips, time: Array, angle: Array) -> bool:
     return False
 
 
+def _is_whole(time: Array, piece: Piece) -> bool:
+    """Whether a piece, which has neighbours, has no gap in it or beside it."""
+    if piece.size < 2:
+        return False
+    span = float(time[piece.after] - time[piece.first])
+    around = time[max(piece.first - 1, 0) : piece.after + 1]
+    return float(np.diff(around).max()) <= MAX_GAP * span
+
+
 def _of_track(record: StrokeRecord, angle: Array) -> Array:
     """The part of the force along the motion that is the same in every revolution, of mean zero."""
     part = np.floor((angle % 1) * MIN_SAMPLES).astype(int) % MIN_SAMPLES
@@ -211,7 +223,7 @@ def _row(record: StrokeRecord, piece: Piece, track: Array) -> Stroke:
         piece=piece,
         direction=piece.direction,
         start_time=float(time[0]),
-        end_time=float(record.time[min(piece.after, record.time.size - 1)]),
+        end_time=float(record.time[piece.after]),
         length=unknown,
         velocity=unknown,
         mean_friction=friction,

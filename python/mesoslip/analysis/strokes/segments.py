@@ -156,6 +156,13 @@ def monotone_pieces(displacement: Array) -> tuple[Piece, ...] | None:
     )
 
 
+def path_of(displacement: Array) -> float:
+    """Length of the path of a displacement, forth and back, without its noise [m]."""
+    x = displacement[np.isfinite(displacement)]
+    pieces = monotone_pieces(x) or (Piece(0, x.size, 1),)
+    return sum(abs(float(x[one.after - 1] - x[one.first])) for one in pieces if x.size)
+
+
 def pieces_of_force(
     time: Array, force: Array, *, is_given: bool = False
 ) -> tuple[Piece, ...] | None:

@@ -253,6 +253,9 @@ def header_cells(line: str, delimiter: str, decimal: str, count: int) -> tuple[s
         # LabVIEW has a column of comments, of which most rows have none.
         if len(cells) == count + 1 and cells[-1].lower() in {"", "comment"}:
             cells = cells[:-1]
+        # The mark of a comment may have the place of the unit of the first column.
+        if len(cells) == count - 1 and COMMENT.match(line) and _are_units(cells):
+            cells = ["", *cells]
         if len(cells) != count or not any(cells):
             continue
         # Units may have a 1.

@@ -220,7 +220,7 @@ class TraceDescription(Table):
     """Whether the force in strokes is along the motion, or against it as that of the drive on the
     sensor; by default such that loops lose energy."""
     velocity: Velocity | None = None
-    """Velocity of the drive, where no load point was recorded."""
+    """Velocity of the drive, where no load point or no times were recorded."""
     hum: Frequency | None = None
     """Frequency of a hum that is removed."""
     trend: Literal["none", "linear"] | None = None

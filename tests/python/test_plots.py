@@ -92,6 +92,18 @@ def test_outputs_whose_clocks_do_not_overlap_are_compared_from_their_starts(shor
     assert moved[0] > early[0]
 
 
+@pytest.mark.parametrize("rows", [400, 40_000])
+def test_a_line_has_the_gaps_of_a_record(tmp_path, rows):
+    """Not where the sampling rate changes."""
+    time = np.concatenate([np.arange(rows), 3 * rows + 20.0 * np.arange(rows)])
+    force = 2 + 0.1 * np.random.default_rng(1).standard_normal(time.size)
+    table = np.transpose([time, force])
+    np.savetxt(tmp_path / "a.csv", table, header="time [s],force [N]", delimiter=",", comments="")
+    figure = mesoslip.plot(mesoslip.read_trace(tmp_path / "a.csv"))
+    line = max(figure.axes[0].lines, key=lambda one: len(one.get_xdata()))
+    assert np.count_nonzero(np.isnan(line.get_ydata())) == 1
+
+
 def test_contacts_that_never_wait_have_no_panel(short):
     assert len(mesoslip.plot(short).axes) == 3
     at_once = klein_tables(contacts__count=10, contacts__delay=0.0, run__duration=0.1)

@@ -9,7 +9,9 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from mesoslip.array_types import Array
+from mesoslip.output.access import is_measured
 from mesoslip.output.arrays import Tree
+from mesoslip.output.samples import times_of
 from mesoslip.plots.axis import HorizontalAxis
 from mesoslip.plots.extent import Extent, line, max_size
 from mesoslip.plots.trace_variables import NAMES, UNITS
@@ -17,6 +19,9 @@ from mesoslip.quantities import scale_for
 
 # Maximum number of other realizations that are drawn behind the first one.
 MAX_OTHERS = 20
+# Minimum time without samples at which a line ends, over the usual interval of all samples and of
+# those around it, a number on each side; with more such times the sampling is uneven.
+MIN_GAP, AROUND, MAX_GAPS = 10.0, 15, 1000
 
 
 class Curve(NamedTuple):
@@ -35,10 +40,26 @@ def curve(tree: Tree, name: str, extent: Extent, **style: Any) -> Curve:
     """The curve of a variable of a run."""
     horizontal, _ = extent.horizontal
     x, y = line(tree, (horizontal, name), extent, extent.window(tree))
+    if horizontal == "time" and is_measured(tree):
+        at = np.searchsorted(x, _gaps(times_of(tree)))
+        at = at[(at > 0) & (at < len(x))]
+        x, y = np.insert(x, at, x[at]), np.insert(y, at, np.nan)
     if np.count_nonzero(np.isfinite(y)) == 1:
         # A line of one sample has no length.
         style = {"marker": ".", **style}
     return Curve(x, y, style)
+
+
+def _gaps(time: Array) -> Array:
+    """Ends of the gaps of a record [s]."""
+    steps = np.diff(time)
+    found = np.flatnonzero(steps > MIN_GAP * np.median(steps)) if steps.size else steps.astype(int)
+    if len(found) > MAX_GAPS:
+        return np.empty(0)
+    around = [steps[max(one - AROUND, 0) : one + AROUND + 1] for one in found.tolist()]
+    usual = np.array([np.median(one) for one in around])
+    ends: Array = time[found[steps[found] > MIN_GAP * usual] + 1]
+    return ends
 
 
 def draw_curves(

@@ -55,6 +55,17 @@ def result(config, force, velocity=None, slips=NO_SLIPS):
     return classify(scales, TIME, force, velocity, slips)
 
 
+@pytest.mark.parametrize(("count", "duration"), [(1, 12.0), (1, 30.0), (12, 12.0)])
+def test_a_slider_that_rests_between_slips_is_not_smooth(klein, count, duration):
+    """However few its contacts, whose noise is large; a rigid one that follows the drive is."""
+    changes = {"contacts__count": count, "run__duration": duration, "output__interval": 0.01}
+    found = mesoslip.regime(mesoslip.run(klein(**changes)))
+    assert found["relative_amplitude"][0] < found["smooth_amplitude"][0]
+    assert found["regime"][0] == (TRANSIENT if found["slips"][0] <= 3 else STICK_SLIP)
+    changes |= {"slider__stiffness": 2000.0, "contacts__count": 4, "run__duration": 4.0}
+    assert mesoslip.regime(mesoslip.run(klein(**changes)))["regime"][0] == SMOOTH
+
+
 def test_noise_of_steady_contacts_is_smooth(klein):
     """0.6 N^(-1/2) of the static force, which with few contacts is much."""
     rng = np.random.default_rng(1)

@@ -27,6 +27,9 @@ from mesoslip.array_types import Array
 SMOOTH_AMPLITUDE = 0.02
 # Percentiles of the force; the amplitude is half their distance.
 LOW, HIGH = 5.0, 95.0
+# Minimum share of the time at rest, and of the loading in slips, of a motion that is not smooth
+# even if its amplitude is that of the noise of a few contacts.
+RESTING = 0.8
 # Minimum scale of amplitudes, over the static force; above it the scale is the mean force.
 MIN_MEAN = 0.05
 # Minimum reversal of the force that ends a cycle, over the distance of the percentiles, and maximum
@@ -120,8 +123,12 @@ def classify(
     result = RegimeResult(force_scale=scales.force_scale, **numbers)  # type: ignore[arg-type]
     regular = SMOOTH_AMPLITUDE * scale / static
     judged = result
-    if scales.is_measured and (are_slips or (len(slips) and len(cycles.periods) < MIN_CYCLES)):
-        # Slips that stand out of the noise are no smooth sliding, however small and few.
+    stands_out = scales.is_measured and (
+        are_slips or (len(slips) > 0 and len(cycles.periods) < MIN_CYCLES)
+    )
+    if stands_out or (result.stick_share > RESTING and slip_share > RESTING):
+        # Slips that stand out of the noise, or between long rests, are no smooth sliding, however
+        # small and few.
         judged, regular = replace(result, smooth_amplitude=0.0), 0.0
     regime = _regime(
         judged, [one / static for one in halves], regular=regular, is_renewed=is_renewed

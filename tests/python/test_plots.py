@@ -100,6 +100,7 @@ def test_a_line_has_the_gaps_of_a_record(tmp_path, rows):
     table = np.transpose([time, force])
     np.savetxt(tmp_path / "a.csv", table, header="time [s],force [N]", delimiter=",", comments="")
     figure = mesoslip.plot(mesoslip.read_trace(tmp_path / "a.csv"))
+    assert figure.axes[0].get_ylabel() == "force (N)"
     line = max(figure.axes[0].lines, key=lambda one: len(one.get_xdata()))
     assert np.count_nonzero(np.isnan(line.get_ydata())) == 1
 

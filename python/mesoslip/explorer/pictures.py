@@ -22,7 +22,7 @@ from mesoslip.output.tree import build_tree
 from mesoslip.plots.close_up import largest_slip, slip_window
 from mesoslip.plots.extent import Extent, line
 from mesoslip.plots.snapshots import is_on_lattice
-from mesoslip.plots.trace_variables import NAMES, UNITS, force_of
+from mesoslip.plots.trace_variables import NAMES, UNITS, force_of, label_of
 from mesoslip.quantities import UNKNOWN, Scale, number, scale_for, with_unit
 from mesoslip.simulation.run_realizations import Results
 from mesoslip.theory.contacts import contact_theory
@@ -295,17 +295,16 @@ def _forces(
     drawn = [line(one, ("time", which), extent, window) for one, which, window in found]
     scale = scale_for(max((_largest(values) for _, values in drawn), default=0.0), "N")
     lines = [
-        Line(times / along.size, values / scale.size, Axis("time", along), Axis(_name(tree), scale))
+        Line(
+            times / along.size,
+            values / scale.size,
+            Axis("time", along),
+            Axis(label_of(tree, force_of(tree)), scale),
+        )
         for times, values in drawn
     ]
     beside = lines.pop() if measured is not None else NOTHING
     return (lines[0] if lines else NOTHING), beside
-
-
-def _name(tree: DataTree) -> str:
-    """Name of the force that shows the motion: without a spring, that of the drive."""
-    is_rigid = math.isinf(config_of(tree).spring_stiffness)
-    return "driving force" if is_rigid else NAMES[force_of(tree)]
 
 
 def _comparison(tree: DataTree, measured: Measured) -> list[tuple[str, str]]:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
+from mesoslip.analysis.apparatus import apparatus_of
 from mesoslip.configuration.units import from_cf_units
 from mesoslip.output.access import config_of, is_measured
 from mesoslip.output.arrays import Tree
@@ -21,6 +24,13 @@ NAMES = {
 # Units of the trace as configurations write them.
 UNITS = {name: from_cf_units(one.units) for name, one in (TRACE | LOADED).items()}
 UNITS["time"] = "s"
+
+
+def label_of(tree: Tree, name: str) -> str:
+    """Label of a variable; a force of an apparatus without a known spring is not that of one."""
+    if name != "spring_force" or 0 < apparatus_of(tree).stiffness < math.inf:
+        return NAMES[name]
+    return "force" if is_measured(tree) else "driving force"
 
 
 def is_known(tree: Tree, name: str) -> bool:

@@ -27,7 +27,7 @@ from mesoslip.plots.style import (
     shared_legend,
     titles,
 )
-from mesoslip.plots.trace_variables import NAMES, UNITS, force_of, is_known
+from mesoslip.plots.trace_variables import UNITS, force_of, is_known, label_of
 from mesoslip.plots.views.base import EXTENT, Options, View
 from mesoslip.quantities import scale_for
 
@@ -139,7 +139,7 @@ def _draw_force(axes: Axes, tree: Tree, extent: Extent, horizontal: HorizontalAx
         curves.append(curve(tree, "spring_force", extent, **at_drive))
         front["label"] = "mean elastic force $K(X_d - X_1)$"
     curves.append(curve(tree, name, extent, **front))
-    draw_curves(axes, curves, name, horizontal)
+    draw_curves(axes, curves, name, horizontal, label_of(tree, name))
     if is_measured(tree):
         marked = draw_marks(axes, tree, name, extent, horizontal)
         if marked:
@@ -229,7 +229,7 @@ def _compare(
         for number, (tree, one, label) in enumerate(zip(trees, names, labels, strict=True))
         if name is None or is_known(tree, name)
     ]
-    quantities = ", ".join(dict.fromkeys(NAMES[one] for one in names))
+    quantities = ", ".join(dict.fromkeys(map(label_of, trees, names)))
     draw_curves(axes, curves, names[0], horizontal, quantities)
 
 

@@ -418,9 +418,18 @@ def test_revolutions_of_a_disc() -> None:
         middle = 0.5 * (rows["start_time"] + rows["end_time"])
         np.testing.assert_allclose(rows["mean_friction"], 2 + 0.01 * middle, atol=2e-3)
         assert "125 samples in each" in found.attrs["notes"]
+        assert "means of rows" not in found.attrs["notes"]
     np.testing.assert_allclose(
         mesoslip.strokes(trees[0])["cycles"]["mean_friction_coefficient"], 0.4, atol=0.03
     )
+    # A load cell that was set to zero again.
+    shifted = np.where(time < 6, 5.0, 4.8)
+    tree = record_tree(time, force, normal_force=shifted, revolutions=0.8 * time)
+    notes = mesoslip.strokes(tree).attrs["notes"]
+    assert "on average; means of rows are from 4.8 N to 5 N" in notes
+    # A row is a stroke and a cycle.
+    heads = [one.title for one in strokes_of(tree).tables]
+    assert heads == ["Revolutions", "Means over rows"]
     # With a few samples in a revolution, rows are of several.
     slow = record_tree(time[::25], force[::25], revolutions=0.8 * time[::25])
     found = mesoslip.strokes(slow)

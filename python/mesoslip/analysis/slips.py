@@ -351,14 +351,20 @@ def counts(tree: Tree) -> dict[str, Any] | None:
 
 def printed_counts(found: dict[str, Any], unit: str) -> PrintedTable:
     """The numbers of slips by minimum fall as a table for print; the unit is that of the force."""
-    falls = column(found["min_fall"], unit, 3)
+    # Steps of a factor, over several decades.
+    falls = column(found["min_fall"], unit)
     mirrored = found.get("mirrored_count", [0] * len(found["min_fall"]))
     rows = zip(found["min_fall"], found["slip_count"], mirrored, strict=True)
     return PrintedTable(
         "Slips by minimum fall",
         (falls.head("minimum fall"), "slips", "mirrored", ""),
         tuple(
-            (falls.text(fall), str(slips), str(noise), "used" if fall == found["used"] else "")
+            (
+                number(fall / falls.scale.size, 3),
+                str(slips),
+                str(noise),
+                "used" if fall == found["used"] else "",
+            )
             for fall, slips, noise in rows
         ),
     )

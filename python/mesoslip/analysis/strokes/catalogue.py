@@ -15,7 +15,7 @@ from mesoslip.analysis.apparatus import apparatus_of
 from mesoslip.analysis.printed_columns import printed_columns
 from mesoslip.analysis.strokes.cycles import Cycle, Overall, cycles_of, overall
 from mesoslip.analysis.strokes.measure import MIDDLE, Measured, Stroke, measure_all
-from mesoslip.analysis.strokes.record import StrokeRecord, record_of
+from mesoslip.analysis.strokes.record import NOUN, StrokeRecord, record_of
 from mesoslip.analysis.strokes.revolutions import found_period, has_rotation, revolutions_of
 from mesoslip.array_types import DataTree
 from mesoslip.configuration import arguments
@@ -120,13 +120,18 @@ class Strokes:
 
     @property
     def tables(self) -> list[PrintedTable]:
-        """Strokes, cycles, and the means over cycles, for print."""
+        """Strokes, cycles, and the means over cycles, for print; of a disc a row is a stroke and a
+        cycle."""
+        noun = self.records[0].noun if self.records else NOUN
+        if noun == NOUN:
+            each, groups = "cycle", [("Strokes", "strokes", STROKE_HEADS)]
+            groups.append(("Cycles", "cycles", CYCLE_HEADS))
+        else:
+            each, heads = "row", STROKE_HEADS | {"stroke_number": ("row", "1")}
+            groups = [(noun.capitalize(), "strokes", heads)]
         tables = [
             printed_columns(title, self.columns[group], heads, self.force_unit)
-            for title, group, heads in (
-                ("Strokes", "strokes", STROKE_HEADS),
-                ("Cycles", "cycles", CYCLE_HEADS),
-            )
+            for title, group, heads in groups
         ]
         if self.overall:
             rows = []
@@ -142,8 +147,8 @@ class Strokes:
                         str(one.cycles),
                     )
                 )
-            heads = ("", "mean", "drift per cycle", "running-in", "cycles")
-            tables.append(PrintedTable("Means over cycles", heads, tuple(rows)))
+            titles = ("", "mean", f"drift per {each}", "running-in", f"{each}s")
+            tables.append(PrintedTable(f"Means over {each}s", titles, tuple(rows)))
         return tables
 
     def write_csv(self, path: Path) -> None:

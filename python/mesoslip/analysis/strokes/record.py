@@ -26,6 +26,8 @@ from mesoslip.output.variables import force_among
 
 # Direction of the force that is given.
 AGAINST = "against"
+# What pieces are, except those of a disc.
+NOUN = "strokes"
 
 
 @dataclass(frozen=True)
@@ -46,7 +48,7 @@ class StrokeRecord:
     correlated: float
     """That of noise that is correlated from sample to sample."""
     correlation_time: float
-    noun: str = "strokes"
+    noun: str = NOUN
     """What the pieces are."""
     remarks: tuple[str, ...] = ()
     """Sentences on the pieces."""
@@ -130,7 +132,7 @@ def record_in(
     realization: int,
     pieces: tuple[Piece, ...],
     source: str,
-    noun: str = "strokes",
+    noun: str = NOUN,
     remarks: tuple[str, ...] = (),
 ) -> StrokeRecord:
     """A realization of an output, cut into pieces."""

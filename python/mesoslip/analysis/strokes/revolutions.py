@@ -7,6 +7,7 @@ given period. A row is one revolution, or as many whole ones as have enough samp
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -27,6 +28,8 @@ MIN_CORRELATION = 0.3
 MIN_SAMPLES = 20
 # Maximum distance of samples in a row, over its time.
 MAX_GAP = 0.2
+# Change of the mean normal force from row to row, over the mean, that is not printed.
+MAX_CHANGE = 0.02
 COUNT, SPEED = "revolutions", "rotation_speed"
 # Falls of the track: minimum number, maximum number that is compared, minimum duration over the
 # time between them, and minimum coherence with the rotation, whose speed may be wrong by a share,
@@ -67,7 +70,7 @@ def revolutions_of(
         "samples in each"
     ]
     if record.normal is not None:
-        remarks.append(f"normal force {with_unit(float(record.normal.mean()), 'N')} on average")
+        remarks.append(_about_load(record.normal, pieces))
     if each > 1:
         remarks.append(
             "a revolution has too few samples for a mean of its own: rows are of "
@@ -185,6 +188,16 @@ def are_of_track(slips: FoundSlips, time: Array, angle: Array) -> bool:
             if abs(phases.sum()) > MIN_COHERENCE * at.size:
                 return True
     return False
+
+
+def _about_load(normal: Array, pieces: Sequence[Piece]) -> str:
+    """A sentence on the normal force, with its range if it changes."""
+    means = [float(normal[one.samples].mean()) for one in pieces if one.size]
+    mean, low, high = float(normal.mean()), min(means), max(means)
+    text = f"normal force {with_unit(mean, 'N')} on average"
+    if high - low <= MAX_CHANGE * mean:
+        return text
+    return f"{text}; means of rows are from {with_unit(low, 'N')} to {with_unit(high, 'N')}"
 
 
 def _is_whole(time: Array, piece: Piece) -> bool:

@@ -95,7 +95,7 @@ def read_record(paths: Sequence[Path], trace: TraceDescription) -> Record:
         notes += _complete(values, made, trace)
     except ValueError as error:
         names = _described(table, columns)
-        raise FileError(f"{path}: {error}; the other columns are {names}") from None
+        raise FileError(f"{path}: {error}{names}") from None
     force = made.values
     if "time" in values:
         time, moved = continued(values["time"], tables, columns.used["time"].index)
@@ -218,27 +218,27 @@ def _check_needed(table: Table, columns: Assignment, trace: TraceDescription) ->
     if not set(FORCES) & used.keys():
         raise FileError(
             f"{table.path}: has no column of the force, such as 'force [uN]', 'shear stress "
-            f"(MPa)' or 'friction'; its other columns are {names}; say what they are with "
+            f"(MPa)' or 'friction'{names}; say what they are with "
             "--columns, or in [trace.columns] of an EXPERIMENT.toml"
         )
     has_rate = rate is not None or ("load_point" in used and trace.si("velocity"))
     if "time" not in used and not has_rate:
         raise FileError(
-            f"{table.path}: has no column of the time, such as 'time [s]'; its other columns are "
-            f"{names}; say what they are with --columns, or give a sampling rate with --rate, or "
-            "for a column of the load point its speed with --velocity"
+            f"{table.path}: has no column of the time, such as 'time [s]'{names}; say what they "
+            "are with --columns, or give a sampling rate with --rate, or for a column of the load "
+            "point its speed with --velocity"
         )
 
 
 def _described(table: Table, columns: Assignment) -> str:
-    """The unused columns of a file, and the reasons."""
+    """The unused columns of a file, and the reasons; empty without any."""
     texts = []
     for index, header in enumerate(table.headers):
         if any(one.index == index for one in columns.used.values()):
             continue
         why = columns.unused.get(index, "")
         texts.append(f"{shown(header)}{f' ({why})' if why and why != 'as asked' else ''}")
-    return ", ".join(texts) or "none"
+    return f"; its other columns are {', '.join(texts)}" if texts else ""
 
 
 class Force(NamedTuple):

@@ -17,7 +17,7 @@ from mesoslip.plots.axis import time_since
 from mesoslip.plots.curves import Curve, curve, draw_curves
 from mesoslip.plots.extent import EVERYTHING, Extent
 from mesoslip.plots.style import BLUE, CONTACT, RED, SPRING, legend_above
-from mesoslip.plots.trace_variables import NAMES, force_of, is_known
+from mesoslip.plots.trace_variables import NAMES, force_of, is_known, label_of
 
 # A slip: its columns of the catalogue, in SI.
 Slip = Mapping[str, float]
@@ -62,8 +62,8 @@ def draw_slip(
     if force_of(tree) == "elastic_force":
         style = {"color": BLUE, "label": "mean elastic force"}
         curves.append(sampling.curve(tree, "elastic_force", near, **style))
-    is_force = name == "spring_force"
-    style = SPRING if is_force else SPRING | {"label": NAMES[name]}
+    is_force, label = name == "spring_force", label_of(tree, name)
+    style = SPRING if label == NAMES["spring_force"] else SPRING | {"label": label}
     curves.append(sampling.curve(tree, name, near, **style))
     if not sampling.resolves(name):
         curves.append(_recorded_slip(slip))

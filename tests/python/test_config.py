@@ -320,6 +320,29 @@ def test_most_thresholds_are_above_the_back_force():
     assert "back_force_ratio: only 0 of the thresholds of young contacts" in message
 
 
+@pytest.mark.parametrize(
+    ("law", "width", "mean"),
+    [
+        ("gaussian", 1.5, 1.6887207),
+        # Without memory, and a lognormal one by its partial moment.
+        ("exponential", 1.0, 1.1),
+        ("lognormal", 1.0, 1.0087525),
+        ("gaussian", 0.3, 1.0013314),
+    ],
+)
+def test_the_mean_of_thresholds_that_can_attach_is_stated(law, width, mean):
+    config = Config.from_dict(
+        klein_tables(contacts__threshold={"law": law, "relative_width": width})
+    )
+    contacts = config.contacts
+    assert contacts.threshold.above(0.1).accepted_mean == pytest.approx(mean, rel=3e-5)
+    message = contacts.cut_thresholds
+    if mean < 1.02:
+        assert message is None
+    else:
+        assert f"{mean:.3g} f_s, {18 * mean:.3g} µN of all contacts" in message
+
+
 def test_everything_wrong_is_reported_at_once():
     messages = problems(
         klein_tables(slider__mass="-1 g", contacts__count=0, drive__velocity="1 N", outputs={})

@@ -71,6 +71,7 @@ def info(
         *checked.notes,
         checked.unreachable_stop,
         checked.contacts.weak_track,
+        checked.contacts.cut_thresholds,
         *map(str, memory_problems(checked)),
     ):
         if message is not None:

@@ -15,6 +15,9 @@ from mesoslip.configuration.threshold_laws import LAWS
 from mesoslip.configuration.threshold_laws.table import sample_problem
 from mesoslip.errors import MesoslipError
 
+# Logarithm of the largest odds of a draw in a mean.
+SHARES = 20.0
+
 
 @arguments.checked(
     law=arguments.text,
@@ -73,6 +76,14 @@ class ThresholdLaw:
     def acceptance(self) -> float:
         """Probability that a draw is not rejected."""
         return self._kernel("survival", np.empty(0))[1]
+
+    @property
+    def accepted_mean(self) -> float:
+        """Mean of the draws that are not rejected."""
+        shares = 1 / (1 + np.exp(np.linspace(-SHARES, SHARES, 2001)))
+        thresholds = np.concatenate([[self.minimum], self.quantile(shares)])
+        above = np.concatenate([[1.0], shares])
+        return self.minimum + float(np.trapezoid(above, thresholds))
 
     @arguments.checked(probability=arguments.array)
     def quantile(self, probability: ArrayLike) -> NDArray[np.float64]:

@@ -379,12 +379,14 @@ class LinearStability(abc.ABC):
                 f"{where} is linearly stable, with {self._ingredients}: small perturbations decay "
                 f"at {decay}. {other}"
             )
-        also = "but not" if self.is_stable_dephased else "also"
         growth = with_unit(self.growth_rate, "1/s", 3)
+        dephased = ""
+        if self.dephased is not self:
+            also = "but not" if self.is_stable_dephased else "also"
+            dephased = f", {also} for dephased contacts (thresholds of {percent(DEPHASED_WIDTH)})"
         return (
             f"{where} is linearly unstable, with {self._ingredients}: {self._perturbation} grows "
-            f"at {growth}, {also} for dephased contacts (thresholds of "
-            f"{percent(DEPHASED_WIDTH)}). {NO_AMPLITUDE}: {shown_by(self.config)}"
+            f"at {growth}{dephased}. {NO_AMPLITUDE}: {shown_by(self.config)}"
         )
 
     @property

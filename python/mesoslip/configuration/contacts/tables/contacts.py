@@ -46,6 +46,8 @@ MIN_ACCEPTED = 0.5
 MIN_STRENGTH, STRONG_PART = 0.05, 0.01
 # Part of a track with the minimum factor of which there is a message.
 MIN_CUT_SHARE = 1e-4
+# Change of the mean threshold by those that are drawn again of which there is a message.
+MIN_SHIFT = 0.02
 # Minimum correlation length of a track over the mean breaking stretch: the contacts of a slider
 # attached along a breaking stretch, over which shorter variations average out.
 MIN_LENGTH_RATIO = 0.1
@@ -204,6 +206,20 @@ class Contacts(Table):
         return (
             f"contacts.track.spread = {self.track.spread:g}: on {100 * share:.2g} % of the track "
             f"the strength is cut off at {floor:.3g} of its mean"
+        )
+
+    @property
+    def cut_thresholds(self) -> str | None:
+        """A message if so many thresholds are drawn again that their mean is another one."""
+        law = self.threshold.above(self.min_threshold)
+        mean = law.accepted_mean
+        if self.ageing is not None or abs(mean - 1) < MIN_SHIFT:
+            return None
+        drawn_again = 1 - self.threshold.probability_above(self.min_threshold)
+        return (
+            f"{100 * drawn_again:.2g} % of the thresholds are not above the back force and are "
+            f"drawn again: the mean of the others is {mean:.3g} f_s, "
+            f"{with_unit(mean * self.static_force, 'N', 3)} of all contacts"
         )
 
     @property

@@ -656,6 +656,7 @@ def test_notebooks_show_a_short_table(klein):
     assert "(9 in total)" in shown
     assert shown.count("<tr>") == 6
     assert len(shown) < 2000
+    assert str(klein()) == klein().to_toml()
 
 
 def test_marks_at_the_start_of_texts_are_read_over(tmp_path):

@@ -480,6 +480,9 @@ class Config(Table):
         with _problems_of("configuration"):
             return super().model_copy(update=update, deep=deep)
 
+    def __str__(self) -> str:
+        return self.to_toml()
+
     def _repr_html_(self) -> str:
         """A short table of the given keys, for notebooks."""
         rows = "".join(

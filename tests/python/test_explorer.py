@@ -32,7 +32,7 @@ from mesoslip.execution.newest_job import NewestJob
 from mesoslip.execution.stop import Stop
 from mesoslip.explorer.controls import BY_KEY, CONTROLS, ROW_HEIGHTS, STEPS, lattice_size, values
 from mesoslip.explorer.knobs import Knob
-from mesoslip.explorer.links import presets
+from mesoslip.explorer.links import Setting, link_of, presets
 from mesoslip.explorer.live_run import Pace, explored, run_live, runnable
 from mesoslip.explorer.movies import (
     around_slip,
@@ -560,6 +560,10 @@ def test_a_slider_that_moves_with_the_drive_is_not_said_to_slip_or_to_slide_smoo
     assert parts[-1].velocity.is_empty
     assert parts[-1].slip_force.is_empty
     assert parts[-1].force.up.quantity == "driving force"
+    ramp = ["slider.kind=force", "drive.velocity=none", "drive.force_rate=1 uN/s"]
+    text = verdict(*ramp, "run.duration=1 s")
+    assert text == "in its last stage the slider does not slide up to 1 µN"
+    assert parts[-1].is_judged
     few = verdict("slider.kind=prescribed", "run.duration=0.1 s")
     assert "longer" not in few
     assert "longer duration" in verdict("run.duration=1 s")
@@ -769,6 +773,20 @@ def test_a_missing_library_is_named(command, monkeypatch):
     assert (status, out) == (2, "")
     assert "mesoslip[explore]" in errors
     assert len(errors.splitlines()) == 1
+
+
+def test_the_command_of_a_page_has_the_changes_of_its_start(command, monkeypatch, tmp_path):
+    path = tmp_path / "my run.toml"
+    path.write_text(Path(KLEIN).read_text())
+    served = []
+    monkeypatch.setattr("mesoslip.explorer.server.serve", lambda *one, **_: served.append(one))
+    command.output("explore", path, "--set", "contacts.delay=1 ms", "--no-browser")
+    session = Session(*served[0])
+    assert session.change("contacts.count", "500")
+    mesoslip_, run, name, *changes = shlex.split(session.command)
+    assert (mesoslip_, run, name) == ("mesoslip", "run", str(path))
+    assert Config.load(name, changes[1::2]) == session.config
+    assert link_of(Setting(*served[0], {})).startswith("?toml=")
 
 
 def test_what_cannot_be_explored_is_reported(command):

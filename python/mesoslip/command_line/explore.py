@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
@@ -66,6 +67,7 @@ def explore(
     from mesoslip.explorer.pictures import Measured
     from mesoslip.explorer.server import serve
 
+    source = shlex.join([source, *(word for one in changes or () for word in ("--set", one))])
     measured = None if trace is None else Measured(trace)
 
     def report(address: str) -> None:

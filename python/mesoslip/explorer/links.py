@@ -7,6 +7,7 @@ the link as a whole, as compressed TOML.
 from __future__ import annotations
 
 import binascii
+import shlex
 import zlib
 from base64 import urlsafe_b64decode, urlsafe_b64encode
 from collections.abc import Mapping, Sequence
@@ -33,7 +34,8 @@ SHARED = "shared.toml"
 
 
 class Setting(NamedTuple):
-    """A configuration to start from, its source, and the text of each key that was changed."""
+    """A configuration to start from, the words of a command that give it (a file, perhaps with
+    changes), and the text of each key that was changed."""
 
     start: Config
     source: str
@@ -51,9 +53,14 @@ def presets() -> dict[str, str]:
     }
 
 
+def stem_of(source: str) -> str:
+    """The name of the file of a source."""
+    return Path(shlex.split(source)[0]).stem
+
+
 def link_of(setting: Setting) -> str:
     """The query of a setting, with its question mark."""
-    name = Path(setting.source).stem
+    name = stem_of(setting.source)
     is_ready = name in examples() and example_config(name) == setting.start
     start = {RUN: name} if is_ready else {FILE: _packed(setting.start.to_toml())}
     return "?" + urlencode({**start, **setting.changes}, safe="/:[]{},")

@@ -40,6 +40,10 @@ const explorer = (() => {
     for (const option of field.options ?? [])
       if (what.omitted) set(option, "hidden", option.value == what.omitted)
       else set(option, "hidden", false)
+    // A run may begin with what cannot be chosen, such as a slider under a force.
+    const options = [...(field.options ?? [])]
+    if (options.length && what.value && !options.some((one) => one.value == what.value))
+      field.add(new Option(what.value, what.value))
     setValue(field, what.value)
     if (slider) {
       setValue(slider, what.position)

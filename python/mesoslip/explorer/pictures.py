@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mesoslip.analysis.regime import IRREGULAR, STICK_SLIP, TRANSIENT, regimes, results_of
+from mesoslip.analysis.regime import IRREGULAR, STICK_SLIP, TRANSIENT, judge
 from mesoslip.analysis.slips import catalogue_of
 from mesoslip.array_types import Array, DataTree
 from mesoslip.configuration.config import Config
@@ -263,7 +263,11 @@ def _loop(tree: DataTree, extent: Extent, force: Line) -> Line:
 def _verdict(results: Results, tree: DataTree) -> tuple[str, bool]:
     """The regime in words, and whether it is final. The beginning of a run shows slips, but not
     that there are none."""
-    config, found = results.config, results_of(regimes(tree))[0]
+    config, (all_found, motion) = results.config, judge(tree)
+    found = all_found[0]
+    if motion is not None:
+        complete = results.complete
+        return (f"in its last stage the slider {motion}" if complete else ""), complete
     if math.isinf(config.spring_stiffness):
         # Whatever the number of cycles, a longer run would show no regime.
         text = found.summary.partition(": ")[2].partition(";")[0]

@@ -266,10 +266,8 @@ class Session:
     @property
     def command(self) -> str:
         """The command that runs the configuration."""
-        words = ["mesoslip", "run", self.source]
-        for key, text in self.changes.items():
-            words += ["--set", f"{key}={text}"]
-        return shlex.join(words)
+        changes = (f"--set {shlex.quote(f'{key}={text}')}" for key, text in self.changes.items())
+        return " ".join(["mesoslip run", self.source, *changes])
 
     def _set_required(self, key: str, text: str) -> None:
         """Add the keys that a choice requires, and remove those that it does not have."""

@@ -36,7 +36,7 @@ from mesoslip.explorer.figures import (
     TheoryView,
 )
 from mesoslip.explorer.knobs import Knob
-from mesoslip.explorer.links import presets
+from mesoslip.explorer.links import presets, stem_of
 from mesoslip.explorer.live_run import Pace, explored, run_live, runnable
 from mesoslip.explorer.movies import movie_of
 from mesoslip.explorer.pictures import Measured, Motion, Theories, Theory, motion
@@ -184,7 +184,7 @@ class Page:
 
     @property
     def _stem(self) -> str:
-        return Path(self.session.source).stem or "run"
+        return stem_of(self.session.source) or "run"
 
     @contextmanager
     def _together(self) -> Iterator[None]:

@@ -381,6 +381,11 @@ class ForceCurve:
             )
         if math.isinf(self.spring_stiffness):
             sentences.append("the slider follows the drive, so it has no instability")
+        elif self.spring_stiffness == 0 and self.falls:
+            sentences.append(
+                "there is no spring: under a force that grows slowly the slider starts to slide at "
+                "F_peak, its static friction"
+            )
         elif self.stable:
             sentences.append(
                 f"{self._name} >= K*: without delay slow sliding from this start has no "

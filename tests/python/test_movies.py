@@ -176,6 +176,15 @@ def test_axes_of_a_movie_stay(layered):
     assert film.count <= movies.MAX_FRAMES
 
 
+def test_the_background_of_a_gif_is_that_of_the_picture(few_snapshots, tmp_path):
+    """Not a mean with the pale edges of lines."""
+    mesoslip.plot(few_snapshots, tmp_path / "a.gif", view="contacts")
+    with Image.open(tmp_path / "a.gif") as image:
+        for number in range(image.n_frames):
+            image.seek(number)
+            assert image.convert("RGB").getpixel((1, 1)) == (255, 255, 255)
+
+
 def test_a_large_gif_has_fewer_colours(tmp_path, monkeypatch):
     frames = [np.random.default_rng(n).integers(0, 255, (60, 60, 3)).astype("u1") for n in range(3)]
     path = tmp_path / "noise.gif"

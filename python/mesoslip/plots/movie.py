@@ -37,6 +37,9 @@ EVEN_SHARE = 0.3
 # Maximum size of a .gif [bytes]; numbers of colours and magnifications that are tried for it.
 MAX_GIF_BYTES = 3_000_000
 GIF_FORMS = ((256, 1.0), (64, 1.0), (32, 1.0), (32, 0.75), (16, 0.5), (8, 0.35))
+# Maximum difference of a colour from the background, in each of red, green and blue, at which it is
+# drawn as that.
+PALE = 8
 # Frames from which the colours of a .gif are taken.
 SAMPLED_FRAMES = 8
 
@@ -159,6 +162,11 @@ def _write_gif(frames: list[NDArray[np.uint8]], path: Path) -> None:
     sample = Image.fromarray(np.concatenate([frames[one] for one in chosen]))
     for colors, magnification in GIF_FORMS:
         palette = sample.quantize(colors, method=Image.Quantize.MAXCOVERAGE)
+        # A mean of colours near it would tint the background.
+        entries = np.array(palette.getpalette(), dtype=int).reshape(-1, 3)
+        background = frames[0][0, 0].astype(int)
+        entries[np.abs(entries - background).max(axis=1) <= PALE] = background
+        palette.putpalette(entries.ravel().tolist())
         images = []
         for frame in frames:
             image = Image.fromarray(frame)

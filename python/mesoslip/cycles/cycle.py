@@ -38,6 +38,9 @@ LONG = 1e9
 # Resolution at which a motion settles first, to a tolerance, and maximum resolution for which it
 # does.
 COARSE, COARSE_TOLERANCE, MAX_FINE = 1.0, 3e-4, 0.5
+# Ratio of successive resolutions between that and the configuration's own, its minimum at the last
+# one, and the number of cycles at each: what differs by the resolution settles there at less cost.
+REFINEMENT, MIN_REFINEMENT, CYCLES_BETWEEN = 0.5, math.sqrt(2), 2
 # Cycles in which a motion settles after that; otherwise it is followed from its own start.
 FEW = 40
 # Initial states, by name.
@@ -190,7 +193,7 @@ def settled_cycle(
         settled = settled.shortest()
     cycle = _cycle_of(config, settled, back if settled.motion == "periodic" else None, is_stable)
     if coarse is not None:
-        solver = f"{cycle.solver}, after {coarse_cycles} passages at resolution {COARSE:g}"
+        solver = f"{cycle.solver}, after {coarse_cycles} passages with longer steps"
         cycle = dataclasses.replace(cycle, coarse_cycles=coarse_cycles, solver=solver)
     followed = time_of(settled.words) - start
     return dataclasses.replace(cycle, cycles=cycles, followed=followed, is_continued=is_continued)
@@ -206,15 +209,32 @@ def _at_coarse(
     return after a disturbance, or at its own resolution does not settle soon, may not be that of
     the start.
     """
-    motion = Motion(_coarse(config))
+    motion = Motion(_with_resolution(config, COARSE))
     settled = settled_at(motion, None, None, is_coarse=True)
     if settled.motion == "irregular":
         return settled, None, settled.cycles
     back = after_disturbance(motion, settled) if settled.motion == "periodic" else None
     if back is None or not back.returns:
         return None, None, 0
-    settled = dataclasses.replace(settled, words=back.words, batches=())
-    return settled, back, settled.cycles + back.cycles * settled.multiple
+    words, between = _refined(config, settled, back.words)
+    count = settled.cycles + back.cycles * settled.multiple + between
+    return dataclasses.replace(settled, words=words, batches=()), back, count
+
+
+def _refined(config: Config, settled: Settled, words: Words) -> tuple[Words, int]:
+    """A state after some cycles at each resolution between the coarse one and the configuration's
+    own, and the number of passages."""
+    assert settled.level is not None
+    count, resolution = 0, COARSE * REFINEMENT
+    while resolution >= MIN_REFINEMENT * config.run.resolution:
+        motion = Motion(_with_resolution(config, resolution))
+        for _ in range(CYCLES_BETWEEN * settled.multiple):
+            passage = motion.next_passage(words, settled.level)
+            if passage is None:
+                break
+            words, count = passage.words, count + 1
+        resolution *= REFINEMENT
+    return words, count
 
 
 def _disturbed(
@@ -238,9 +258,9 @@ def _disturbed(
     return settled, back, cycles
 
 
-def _coarse(config: Config) -> Config:
-    """The configuration at the coarse resolution."""
-    return config.adapted(lambda one: one.replace({"run.resolution": COARSE}))
+def _with_resolution(config: Config, resolution: float) -> Config:
+    """The configuration at another resolution."""
+    return config.adapted(lambda one: one.replace({"run.resolution": resolution}))
 
 
 def _cycle_of(

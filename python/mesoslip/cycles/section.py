@@ -90,12 +90,12 @@ class Passage:
     @property
     def peak(self) -> float:
         """Maximum of the spring force [N]."""
-        return extreme(self.trace["spring_force"])
+        return extreme(self.trace, 1)
 
     @property
     def low(self) -> float:
         """Minimum of the spring force [N]."""
-        return -extreme(-self.trace["spring_force"])
+        return extreme(self.trace, -1)
 
     @property
     def slip_duration(self) -> float:
@@ -103,14 +103,58 @@ class Passage:
         return float(np.sum(self.slips["end_time"] - self.slips["start_time"]))
 
 
-def extreme(values: Array) -> float:
-    """Maximum of samples of a smooth function, by a parabola."""
-    at = int(np.argmax(values))
-    if not 0 < at < len(values) - 1:
-        return float(values[at])
-    before, peak, after = (float(one) for one in values[at - 1 : at + 2])
-    bend = before - 2 * peak + after
-    return peak if bend >= 0 else peak - (after - before) ** 2 / (8 * bend)
+def extreme(trace: Trace, sign: int) -> float:
+    """Maximum (sign 1) or minimum (-1) of the spring force, by cubic interpolation with its rates.
+
+    A parabola through samples would depend on where they lie, by some 1e-5 of the amplitude.
+    """
+    force = sign * trace["spring_force"]
+    at, opposite = int(np.argmax(force)), int(np.argmin(force))
+    stretch = trace["drive_displacement"] - trace["displacement"]
+    if not 0 < at < len(force) - 1 or stretch[at] == stretch[opposite]:
+        return sign * float(force[at])
+    spring = (force[at] - force[opposite]) / (stretch[at] - stretch[opposite])
+    near = trace[at - 1 : at + 2]
+    drive_velocity = np.ptp(near["drive_displacement"]) / np.ptp(near["time"])
+    rates = spring * (drive_velocity - near["velocity"])
+    first = 1 if rates[1] > 0 else 0
+    duration = float(near["time"][first + 1] - near["time"][first])
+    cubic = Cubic(*force[at - 1 + first :][:2].tolist(), *(duration * rates[first:][:2]).tolist())
+    return sign * cubic.maximum()
+
+
+class Cubic(NamedTuple):
+    """A cubic polynomial of 0 to 1, by its values and slopes at both ends."""
+
+    start: float
+    end: float
+    start_slope: float
+    end_slope: float
+
+    def __call__(self, part: float) -> float:
+        """Its value."""
+        square, cube = self._coefficients
+        return self.start + part * (self.start_slope + part * (square + part * cube))
+
+    def slope(self, part: float) -> float:
+        """Its slope."""
+        square, cube = self._coefficients
+        return self.start_slope + part * (2 * square + 3 * part * cube)
+
+    def maximum(self) -> float:
+        """Its maximum; at an end unless it rises at the start and falls at the end."""
+        if not self.start_slope > 0 > self.end_slope:
+            return max(self.start, self.end)
+        square, cube = self._coefficients
+        root = math.sqrt(square**2 - 3 * cube * self.start_slope)
+        return self(self.start_slope / (root - square))
+
+    @property
+    def _coefficients(self) -> tuple[float, float]:
+        """Its coefficients of the square and the cube."""
+        rise = self.end - self.start
+        square = 3 * rise - 2 * self.start_slope - self.end_slope
+        return square, self.start_slope + self.end_slope - 2 * rise
 
 
 class Motion:
@@ -265,22 +309,13 @@ class _PassageSearch:
         drive = late[DRIVE] - early[DRIVE]
         spring = rise / (drive - (late[DISPLACEMENT] - early[DISPLACEMENT]))
         slope = spring * (drive - duration * np.array([early[VELOCITY], late[VELOCITY]]))
+        cubic = Cubic(*force.tolist(), *slope.tolist())
         part = (self._level.force - force[0]) / rise
         for _ in range(NEWTON_STEPS):
-            value = (
-                force[0]
-                + part * slope[0]
-                + part**2 * (3 * rise - 2 * slope[0] - slope[1])
-                + part**3 * (slope[0] + slope[1] - 2 * rise)
-            )
-            change = (
-                slope[0]
-                + 2 * part * (3 * rise - 2 * slope[0] - slope[1])
-                + 3 * part**2 * (slope[0] + slope[1] - 2 * rise)
-            )
+            change = cubic.slope(part)
             if change <= 0:
                 break
-            part = min(1.0, max(0.0, part - (value - self._level.force) / change))
+            part = min(1.0, max(0.0, part - (cubic(part) - self._level.force) / change))
         return float(early[TIME] + part * duration)
 
 

@@ -40,7 +40,7 @@ LONG = 1e9
 COARSE, COARSE_TOLERANCE, MAX_FINE = 1.0, 3e-4, 0.5
 # Ratio of successive resolutions between that and the configuration's own, its minimum at the last
 # one, and the number of cycles at each: what differs by the resolution settles there at less cost.
-REFINEMENT, MIN_REFINEMENT, CYCLES_BETWEEN = 0.5, math.sqrt(2), 2
+REFINEMENT, MIN_REFINEMENT, CYCLES_BETWEEN = 0.5, math.sqrt(2), 3
 # Cycles in which a motion settles after that; otherwise it is followed from its own start.
 FEW = 40
 # Initial states, by name.
@@ -157,6 +157,7 @@ def settled_cycle(
         *,
         is_coarse: bool = False,
         max_passages: int | None = None,
+        decay: float | None = None,
     ) -> Settled:
         return settle(
             motion,
@@ -168,6 +169,7 @@ def settled_cycle(
             tolerance=max(tolerance, COARSE_TOLERANCE) if is_coarse else tolerance,
             max_cycles=max_cycles,
             max_passages=max_passages,
+            decay=decay,
             progress=partial(report, is_coarse=is_coarse),
         )
 
@@ -181,7 +183,14 @@ def settled_cycle(
             coarse, back, coarse_cycles = _at_coarse(config, settled_at)
     if coarse is not None:
         few = None if back is None else FEW * coarse.multiple
-        settled = settled_at(motion, coarse.words, coarse.level, coarse.batches, max_passages=few)
+        settled = settled_at(
+            motion,
+            coarse.words,
+            coarse.level,
+            coarse.batches,
+            max_passages=few,
+            decay=None if back is None else back.decay(coarse.multiple),
+        )
         if back is not None and settled.motion != "periodic":
             settled = coarse = back = None
     if settled is None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from itertools import chain
+from itertools import chain, pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from mesoslip.array_types import Array
 from mesoslip.simulation.archive import entries
-from mesoslip.simulation.kernel import Kernel, Words
+from mesoslip.simulation.kernel import Kernel, Progress, Words
 from mesoslip.simulation.kernel_setup import NEVER, KernelSetup
 from mesoslip.simulation.recorded_tables import SLIP_COLUMNS, TRACE_COLUMNS, structured
 
@@ -28,6 +28,8 @@ SAMPLES_OF_RINGING = 32
 # Maximum number of advances after which the trace is searched for a passage once the force has been
 # low, minimum number near one, and part of the advances to an extrapolated one before the search.
 CHUNK, MIN_CHUNK, APPROACH = 128, 16, 0.8
+# Parts of the advances in a passage between which the next one is searched for its end.
+SEARCHED = 0.0, 0.8, 0.96, 0.99
 # Number of advances between two drains without a search.
 MANY = 65536
 # Level of the section, and level below which the force must have been, relative to its range.
@@ -169,19 +171,18 @@ class Motion:
         self.interval = ringing / SAMPLES_OF_RINGING
         force = contacts.static_force
         self.loading_time = force * (1 / spring + 2 / contacts.stiffness) / abs(self.velocity)
-        self._chunk = int(CHUNK / math.sqrt(config.run.resolution))
+        # Advances before the next passage is searched, the first time as many as until its end.
+        self._expected = [int(CHUNK / math.sqrt(config.run.resolution))]
         self.setup_period = 2 * math.pi * math.sqrt(mass / spring)
         # Its contacts are copied, which is faster than making them again.
-        self._template = Kernel()
+        template = Kernel()
         kind = config.contact_kind
-        self._template.set_contacts(
-            kind.kernel_kind, kind.kernel_parameters(config), config.run.seed, 0
-        )
+        template.set_contacts(kind.kernel_kind, kind.kernel_parameters(config), config.run.seed, 0)
+        self._setup = KernelSetup(config, template, interval=self.interval)
 
     def open(self, words: Words | None, end_time: float = NEVER) -> Kernel:
         """A kernel at a state, or at the start, with a drive that ends at a time [s]."""
-        setup = KernelSetup(self.config, self._template, end_time=end_time, interval=self.interval)
-        kernel = setup.open()
+        kernel = self._setup.open(end_time=end_time)
         if words is None:
             kernel.start(self.config.contacts.initial)
         else:
@@ -208,13 +209,13 @@ class Motion:
     def next_passage(self, words: Words, level: Level) -> Passage | None:
         """Advance from a state to the next passage through a level; None if the maximum time is
         reached."""
-        start = time_of(words)
         kernel = self.open(words)
-        pieces = [_Piece(words, start, [], [])]
-        limit = start + MAX_LOADINGS * self.loading_time + MAX_PERIODS * self.setup_period
+        start = now = kernel.ask()
+        pieces = [_Piece(words, start.time, [], [])]
+        limit = start.time + MAX_LOADINGS * self.loading_time + MAX_PERIODS * self.setup_period
         search = _PassageSearch(level)
-        now, chunk = start, self._chunk
-        while now < limit:
+        chunk, *others = self._expected
+        while now.time < limit:
             kernel.advance(chunk, ANY_WORK)
             trace, slips = _taken(kernel)
             pieces[-1].traces.append(trace)
@@ -225,16 +226,19 @@ class Motion:
                 while pieces[-1].time >= found:
                     pieces.pop()
                 return self._cut(start, found, pieces)
-            before, now = now, kernel.ask().time
-            if search.has_been_low:
-                pieces.append(_Piece(kernel.save(), now, [], []))
+            before, now = now, kernel.ask()
+            if others or search.has_been_low:
+                pieces.append(_Piece(kernel.save(), now.time, [], []))
                 # The last piece is repeated: near a passage pieces are short.
-                chunk = search.advances_left(trace, chunk / (now - before))
+                chunk = search.advances_left(trace, chunk / (now.time - before.time))
+            if others:
+                chunk = others.pop(0)
         kernel.close()
         return None
 
-    def _cut(self, start: float, time: float, pieces: list[_Piece]) -> Passage:
-        """The motion up to a passage at a time [s], for which the last piece is repeated."""
+    def _cut(self, start: Progress, time: float, pieces: list[_Piece]) -> Passage:
+        """The motion up to a passage at a time [s], for which the last piece is repeated; the next
+        passage is expected to take as many advances."""
         last = pieces.pop()
         kernel = self.open(last.words, time)
         while not kernel.ask().ending:
@@ -242,13 +246,19 @@ class Motion:
         trace, slips = _taken(kernel)
         traces = [*chain.from_iterable(one.traces for one in pieces), trace]
         catalogues = [*chain.from_iterable(one.slips for one in pieces), slips]
+        self._expect(kernel.ask().advances - start.advances)
         return Passage(
             self._saved(kernel),
-            start,
+            start.time,
             time,
             structured(np.concatenate(traces), TRACE_COLUMNS),
             structured(np.concatenate(catalogues), SLIP_COLUMNS),
         )
+
+    def _expect(self, advances: int) -> None:
+        """Set the advances before each search for the next passage, the last ones close to it."""
+        ends = [int(part * advances) for part in SEARCHED]
+        self._expected = [max(1, end - begin) for begin, end in pairwise(ends)]
 
 
 def _taken(kernel: Kernel) -> tuple[Array, Array]:

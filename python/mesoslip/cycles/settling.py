@@ -39,6 +39,8 @@ SHRINKING, SETTLING, SLOWLY = 0.98, 0.5, 0.9
 EQUAL_SPREAD, EQUAL_CHANGE = 3.0, 10.0
 # Passages of a motion whose changes still shrink, over the maximum number of those of others.
 SLOW_PASSAGES = 3
+# Range of the distance to the limit over the last change, where the decay is known.
+MIN_DISTANCE, MAX_DECAY = 0.5, 0.97
 # Amplitude over F_s below which sliding is smooth.
 MIN_AMPLITUDE = 1e-3
 # Time before the first section, in times of loading plus periods of the setup.
@@ -115,6 +117,7 @@ def settle(
     tolerance: float = TOLERANCE,
     max_cycles: int = MAX_CYCLES,
     max_passages: int | None = None,
+    decay: float | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Settled:
     """Iterate a motion to its settled state, from a state with a section that may fit, or from the
@@ -125,10 +128,10 @@ def settle(
     compared with itself later, and with the batches of a motion that led to the state and did not
     settle at a coarse resolution. ``progress`` is called with the passages over that number.
     With ``max_passages`` a motion that needs more is irregular, three times as many where its
-    changes still shrink.
+    changes still shrink. The factor by which a disturbance decays in a passage may be known.
     """
     start = 0.0 if words is None else time_of(words)
-    run = _Settling(motion, is_stable, root, tolerance, start, max_passages)
+    run = _Settling(motion, is_stable, root, tolerance, start, max_passages, decay)
     run.continue_after(batches, max_cycles)
     if words is None or level is None:
         words, trace = motion.advance(words, run.window)
@@ -157,9 +160,10 @@ class _Settling:
         tolerance: float,
         start: float,
         max_passages: int | None = None,
+        decay: float | None = None,
     ) -> None:
         self._motion, self._is_stable, self._tolerance = motion, is_stable, tolerance
-        self._start, self._max_passages = start, max_passages
+        self._start, self._max_passages, self._decay = start, max_passages, decay
         self._amplitudes = Amplitudes(motion.velocity, is_stable, root)
         self._force = motion.config.contacts.static_force
         self.window = LOADINGS * motion.loading_time + PERIODS * motion.setup_period
@@ -321,15 +325,26 @@ class _Settling:
             last = float(np.max(sizes[-multiple:]))
             before = float(np.max(sizes[: len(sizes) - multiple][-multiple:], initial=0.0))
             is_shrinking = is_shrinking or last < SHRINKING * before
-            factor = min(0.99, last / before) if before > 0 else 0.9
             first = last if multiple == 1 else first
             if multiple == 1 or first > EQUAL_CHANGE * last:
-                found.append((max(1.0, factor / (1 - factor)) * last, multiple))
+                found.append((self._distance(last, before, multiple), multiple))
         if not found:
             return 1, math.inf
         settled = [one for one in found if one[0] < self._tolerance]
         error, multiple = min(settled, key=lambda one: one[1]) if settled else min(found)
         return multiple, error
+
+    def _distance(self, last: float, before: float, multiple: int) -> float:
+        """Distance of a cycle of some passages to its limit, by its last two changes.
+
+        Their ratio may be small by accident: where the decay is known, none is taken to be smaller
+        than what is left of the one before.
+        """
+        if self._decay is None:
+            factor = min(0.99, last / before) if before > 0 else 0.9
+            return max(1.0, factor / (1 - factor)) * last
+        factor = min(MAX_DECAY, self._decay**multiple)
+        return max(last, factor * before) * max(MIN_DISTANCE, factor / (1 - factor))
 
     def _decays(self) -> bool:
         """Whether the amplitude decays to zero, by linear theory or its geometric series."""

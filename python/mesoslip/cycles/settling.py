@@ -231,7 +231,8 @@ class _Settling:
                     return words, Level.of(force), ""
                 return words, level, "periodic"
         if self._max_passages:
-            return words, level, "irregular"
+            stays = self._spread()[1] < MAX_SPREAD and self._trend() < 1 / SLOWLY
+            return words, level, "periodic" if stays else "irregular"
         self._amplitudes.end_batch()
         if self._amplitudes.fall_between_batches():
             return words, None, "smooth"
@@ -264,9 +265,13 @@ class _Settling:
         """Whether the changes over a cycle still shrink, of a motion with a maximum of passages."""
         if self._count >= SLOW_PASSAGES * (self._max_passages or 0) or len(self._rows) < 6:
             return False
+        return self._trend() < SLOWLY
+
+    def _trend(self) -> float:
+        """The changes over a cycle in the last third of the passages, over those in the middle."""
         sizes = np.max(np.abs(self._differences(self._multiple()[0])), axis=1)
         _, middle, late = (float(np.median(one)) for one in np.array_split(sizes, 3))
-        return late < SLOWLY * middle
+        return late / max(middle, 1e-300)
 
     def _spread(self) -> tuple[int, float]:
         """Number of passages in a cycle with the smallest relative spread, and that spread."""

@@ -108,7 +108,8 @@ class Passage:
 def extreme(trace: Trace, sign: int) -> float:
     """Maximum (sign 1) or minimum (-1) of the spring force, by cubic interpolation with its rates.
 
-    A parabola through samples would depend on where they lie, by some 1e-5 of the amplitude.
+    A parabola through samples would depend on where they lie, by up to 1e-5 of the amplitude: as
+    much as the tolerance of a cycle.
     """
     force = sign * trace["spring_force"]
     at, opposite = int(np.argmax(force)), int(np.argmin(force))

@@ -292,7 +292,8 @@ def test_a_motion_that_long_steps_may_mislead_begins_at_its_own_start(monkeypatc
 
     def after(which, found):
         disturbed.append(which.config.run.resolution)
-        return after_disturbance(which, found)._replace(returns=len(disturbed) > 1)
+        back = after_disturbance(which, found)
+        return back._replace(returns=len(disturbed) > 1, multipliers=(0.95,))
 
     monkeypatch.setattr(mesoslip.cycles.cycle, "settle", settled)
     monkeypatch.setattr(mesoslip.cycles.cycle, "after_disturbance", after)
@@ -301,6 +302,8 @@ def test_a_motion_that_long_steps_may_mislead_begins_at_its_own_start(monkeypatc
     assert disturbed == [1.0, 0.5]
     assert found.is_stable
     assert found.coarse_cycles == 0
+    # By the last changes alone it would be less than the tolerance.
+    assert found.error > 1e-5
     assert "long steps" not in found.verdict
     assert "leads away" in dataclasses.replace(found, is_stable=False).verdict
 
@@ -416,6 +419,25 @@ def test_a_cycle_that_settles_slowly_is_not_irregular(regular):
     brief.factor = -0.7
     assert settle(brief, regular.state, regular.section, max_passages=9).motion == "periodic"
     assert 9 < brief.number < 40
+
+
+@pytest.mark.parametrize(("growth", "motion"), [(1.0, "periodic"), (1.05, "irregular")])
+def test_a_fine_structure_is_that_of_a_cycle_unless_it_grows(regular, growth, motion):
+    class Made(Motion):
+        number = 0
+
+        def next_passage(self, words, _level):
+            self.number += 1
+            trace = regular._trace.copy()
+            part = 1e-3 * math.sin(2.4 * self.number) * growth ** (self.number - 30)
+            trace["spring_force"] *= 1 + part
+            end = self.number * regular.period
+            return Passage(words, end - regular.period, end, trace, trace[:0])
+
+    made = Made(regular.config)
+    found = settle(made, regular.state, regular.section, max_passages=30)
+    assert found.motion == motion
+    assert 30 <= made.number < 40
 
 
 def test_a_state_is_the_same_after_taking_it_apart(regular):

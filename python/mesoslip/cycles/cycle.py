@@ -198,6 +198,8 @@ def settled_cycle(
     cycles = settled.cycles
     if back is None and (find_multipliers or begins_coarse):
         settled, back, cycles = _disturbed(motion, settled, settled_at, 10 * tolerance)
+        if back is not None:
+            settled = settled.with_decay(back.decay(settled.multiple))
     if settled.motion == "periodic":
         settled = settled.shortest()
     cycle = _cycle_of(config, settled, back if settled.motion == "periodic" else None, is_stable)

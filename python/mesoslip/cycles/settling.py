@@ -88,6 +88,14 @@ class Settled:
         limit = max(tolerance, SAME_ERRORS * (self.error + other.error))
         return float(max(changes)) < limit
 
+    def with_decay(self, decay: float | None) -> Settled:
+        """The cycle with an error that agrees with the decay of a disturbance in a passage."""
+        if decay is None or len(self.rows) < 2 * self.multiple + 1:
+            return self
+        last, before = _last_changes(self.rows, self.multiple)
+        error = _distance(last, before, decay**self.multiple)
+        return dataclasses.replace(self, error=max(self.error, error))
+
     def shortest(self) -> Settled:
         """The cycle with the fewest passages that differ by no more than a fine structure."""
         period, peak, low = self.rows[-1]
@@ -99,6 +107,34 @@ class Settled:
                 passages, error = self.passages[-part:], max(self.error, change)
                 return dataclasses.replace(self, multiple=part, passages=passages, error=error)
         return self
+
+
+def _changes(rows: Array, multiple: int, min_amplitude: float = 0.0) -> Array:
+    """Relative changes of period, peak and low over cycles of some passages, shape (n, 3)."""
+    changes: Array = rows[multiple:] - rows[:-multiple]
+    amplitude = max(float(rows[-1, 1] - rows[-1, 2]), min_amplitude)
+    changes /= np.array([float(rows[-1, 0]), amplitude, amplitude])
+    return changes
+
+
+def _last_changes(rows: Array, multiple: int, min_amplitude: float = 0.0) -> tuple[float, float]:
+    """The largest change over the last cycle of some passages, and over the one before."""
+    sizes = np.max(np.abs(_changes(rows, multiple, min_amplitude)), axis=1)
+    last = float(np.max(sizes[-multiple:]))
+    return last, float(np.max(sizes[: len(sizes) - multiple][-multiple:], initial=0.0))
+
+
+def _distance(last: float, before: float, decay: float | None) -> float:
+    """Distance of a cycle to its limit by its last two changes, and the decay in a cycle.
+
+    The ratio of changes may be small by accident: where the decay is known, none is taken to be
+    smaller than the remainder of the one before.
+    """
+    if decay is None:
+        factor = min(0.99, last / before) if before > 0 else 0.9
+        return max(1.0, factor / (1 - factor)) * last
+    factor = min(MAX_DECAY, decay)
+    return max(last, factor * before) * max(MIN_DISTANCE, factor / (1 - factor))
 
 
 def _extremes(rows: Array) -> Array:
@@ -309,12 +345,8 @@ class _Settling:
         return force
 
     def _differences(self, multiple: int) -> Array:
-        """Relative changes of period, peak and low over cycles of some passages, shape (n, 3)."""
-        rows = np.array(self._rows)
-        changes: Array = rows[multiple:] - rows[:-multiple]
-        amplitude = max(float(rows[-1, 1] - rows[-1, 2]), 1e-9 * self._force)
-        changes /= np.array([float(rows[-1, 0]), amplitude, amplitude])
-        return changes
+        """See `_changes`."""
+        return _changes(np.array(self._rows), multiple, 1e-9 * self._force)
 
     def _multiple(self) -> tuple[int, float]:
         """Number of passages in a cycle, and the estimated relative error of its period and peaks.
@@ -326,30 +358,17 @@ class _Settling:
         for multiple in range(1, MAX_MULTIPLE + 1):
             if len(self._rows) < 2 * multiple + 1 or (multiple > 1 and is_shrinking):
                 break
-            sizes = np.max(np.abs(self._differences(multiple)), axis=1)
-            last = float(np.max(sizes[-multiple:]))
-            before = float(np.max(sizes[: len(sizes) - multiple][-multiple:], initial=0.0))
+            last, before = _last_changes(np.array(self._rows), multiple, 1e-9 * self._force)
             is_shrinking = is_shrinking or last < SHRINKING * before
             first = last if multiple == 1 else first
             if multiple == 1 or first > EQUAL_CHANGE * last:
-                found.append((self._distance(last, before, multiple), multiple))
+                decay = None if self._decay is None else self._decay**multiple
+                found.append((_distance(last, before, decay), multiple))
         if not found:
             return 1, math.inf
         settled = [one for one in found if one[0] < self._tolerance]
         error, multiple = min(settled, key=lambda one: one[1]) if settled else min(found)
         return multiple, error
-
-    def _distance(self, last: float, before: float, multiple: int) -> float:
-        """Distance of a cycle of some passages to its limit, by its last two changes.
-
-        Their ratio may be small by accident: where the decay is known, none is taken to be smaller
-        than what is left of the one before.
-        """
-        if self._decay is None:
-            factor = min(0.99, last / before) if before > 0 else 0.9
-            return max(1.0, factor / (1 - factor)) * last
-        factor = min(MAX_DECAY, self._decay**multiple)
-        return max(last, factor * before) * max(MIN_DISTANCE, factor / (1 - factor))
 
     def _decays(self) -> bool:
         """Whether the amplitude decays to zero, by linear theory or its geometric series."""

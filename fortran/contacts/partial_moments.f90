@@ -27,8 +27,9 @@ module mesoslip_contacts_partial_moments
       !> Correction of the density for thresholds outside the table
       real(wp), private :: scale = 1.0_wp
       real(wp), private :: point(points) = 0.0_wp, weight(points) = 0.0_wp
-      !> Exponents, shape (orders)
+      !> Exponents, shape (orders), and their numbers of halves, huge for others
       real(wp), allocatable, private :: exponent(:)
+      integer, allocatable, private :: halves(:)
       !> Moments above each knot and their slopes, shape (orders, 2, cells + 1)
       real(wp), allocatable, private :: table(:, :, :)
       !> For a law with a constant density in cells, instead of a table: edges of the cells, density
@@ -56,6 +57,8 @@ contains
 
       allocate (self%law, source=law)
       self%exponent = exponent
+      self%halves = merge(nint(2.0_wp * exponent), huge(1), &
+         & .not. abs(2.0_wp * exponent - nint(2.0_wp * exponent)) > 0.0_wp)
       self%min_threshold = law%quantile(1.0_wp - epsilon(1.0_wp))
       self%max_threshold = law%quantile(outside)
       if (law%cells > 0) then
@@ -162,35 +165,34 @@ contains
       real(wp), intent(in) :: coordinate
       real(wp) :: density(size(self%exponent))
 
-      real(wp) :: threshold
+      real(wp) :: threshold, root
 
       threshold = self%coordinate%threshold(coordinate)
-      density = self%scale * self%law%density(threshold) * power(threshold, self%exponent) &
-         & * self%coordinate%slope(coordinate)
+      root = sqrt(threshold)
+      density = self%scale * self%law%density(threshold) * power(threshold, root, self%exponent, &
+         & self%halves) * self%coordinate%slope(coordinate)
    end function density
 
-   !> A power of a threshold, by roots and products for multiples of 1/2 from -1 to 2.
-   elemental function power(threshold, exponent)
-      real(wp), intent(in) :: threshold, exponent
+   !> A power of a threshold, by its root and products for multiples of 1/2 from -1 to 2.
+   elemental function power(threshold, root, exponent, halves)
+      real(wp), intent(in) :: threshold, root, exponent
+      !> Number of halves in the exponent
+      integer, intent(in) :: halves
       real(wp) :: power
 
-      integer :: halves
-
-      halves = nint(2.0_wp * exponent)
-      if (abs(2.0_wp * exponent - halves) > 0.0_wp) halves = huge(halves)
       select case (halves)
       case (-2)
          power = 1.0_wp / threshold
       case (-1)
-         power = 1.0_wp / sqrt(threshold)
+         power = 1.0_wp / root
       case (0)
          power = 1.0_wp
       case (1)
-         power = sqrt(threshold)
+         power = root
       case (2)
          power = threshold
       case (3)
-         power = threshold * sqrt(threshold)
+         power = threshold * root
       case (4)
          power = threshold**2
       case default

@@ -11,6 +11,7 @@ import re
 import signal
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import mesoslip
 import mesoslip.__main__ as program
@@ -20,6 +21,7 @@ import tomli_w
 import xarray as xr
 from conftest import ROOT, klein_tables, long
 from mesoslip.analysis.regime import outputs
+from mesoslip.command_line import run as run_command
 from mesoslip.command_line.main import COMMANDS, GROUPS, app
 from mesoslip.command_line.progress import say
 from mesoslip.errors import RunError
@@ -307,6 +309,20 @@ def test_start_up_is_quick():
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
+def test_a_run_needs_no_thread_for_imports(short, tmp_path, command, monkeypatch):
+    class Refused:
+        def __init__(self, **_):
+            pass
+
+        def start(self):
+            raise RuntimeError("can't start new thread")
+
+    monkeypatch.setattr(run_command, "threading", SimpleNamespace(Thread=Refused))
+    output = tmp_path / "short.nc"
+    command("run", short, "-o", output)
+    assert output.exists()
+
+
 def test_commands_import_what_they_need(short, tmp_path, command):
     """Large packages that each of several commands adds to those imported before."""
     output = tmp_path / "short.nc"
@@ -337,6 +353,7 @@ import json, sys
 from mesoslip.analysis.regime import outputs
 from mesoslip.command_line.main import main
 large = ["dask", "matplotlib", "mpl_toolkits.mplot3d", "netCDF4", "pandas", "pint", "xarray"]
+large += ["mesoslip.analysis.strokes"]
 large += [f"scipy.{{one}}" for one in ("integrate", "interpolate", "optimize", "special", "stats")]
 stdout, found = sys.stdout, []
 for arguments in {commands}:
@@ -359,7 +376,7 @@ json.dump(found, stdout)
         ["scipy.interpolate", "scipy.optimize", "scipy.special"],
         [],
         [],
-        ["matplotlib"],
+        ["matplotlib", "mesoslip.analysis.strokes"],
         [],
         [],
         ["pandas", "xarray"],

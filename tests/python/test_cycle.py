@@ -13,12 +13,13 @@ from conftest import ROOT, at_end
 from mesoslip.cycles import branch
 from mesoslip.cycles.branch import adapted
 from mesoslip.cycles.coordinates import PINNED, SLIDER, Coordinates
-from mesoslip.cycles.cycle import _cycle_of, _disturbed, master_equation
+from mesoslip.cycles.cycle import _cycle_of, _disturbed, _refined, master_equation
 from mesoslip.cycles.decay import Batch
 from mesoslip.cycles.disturbance import MAX_RETURN, after_disturbance, multipliers
-from mesoslip.cycles.section import Motion, Passage
+from mesoslip.cycles.section import Motion, Passage, extreme, time_of
 from mesoslip.cycles.settling import Settled, _Settling, settle
 from mesoslip.simulation.archive import Archive
+from mesoslip.simulation.recorded_tables import TRACE_COLUMNS
 from mesoslip.theory.contacts import contact_theory
 from mesoslip.theory.contacts.plain_sliding import SteadySliding
 from scipy.optimize import minimize_scalar
@@ -291,7 +292,8 @@ def test_a_motion_that_long_steps_may_mislead_begins_at_its_own_start(monkeypatc
 
     def after(which, found):
         disturbed.append(which.config.run.resolution)
-        return after_disturbance(which, found)._replace(returns=len(disturbed) > 1)
+        back = after_disturbance(which, found)
+        return back._replace(returns=len(disturbed) > 1, multipliers=(0.95,))
 
     monkeypatch.setattr(mesoslip.cycles.cycle, "settle", settled)
     monkeypatch.setattr(mesoslip.cycles.cycle, "after_disturbance", after)
@@ -300,6 +302,8 @@ def test_a_motion_that_long_steps_may_mislead_begins_at_its_own_start(monkeypatc
     assert disturbed == [1.0, 0.5]
     assert found.is_stable
     assert found.coarse_cycles == 0
+    # By the last changes alone it would be less than the tolerance.
+    assert found.error > 1e-5
     assert "long steps" not in found.verdict
     assert "leads away" in dataclasses.replace(found, is_stable=False).verdict
 
@@ -310,8 +314,40 @@ def test_a_passage_does_not_depend_on_when_it_is_sought(regular, chunk, monkeypa
     found = motion.next_passage(regular.state, regular.section)
     monkeypatch.setattr(mesoslip.cycles.section, "CHUNK", chunk)
     again = Motion(regular.config).next_passage(regular.state, regular.section)
-    assert np.array_equal(found.words, again.words)
-    assert found.time == again.time
+    # Which is sought near the end of the one before.
+    repeated = motion.next_passage(regular.state, regular.section)
+    for one in (again, repeated):
+        assert np.array_equal(found.words, one.words)
+        assert found.time == one.time
+
+
+def test_extremes_do_not_depend_on_where_samples_lie():
+    """A parabola through three of them is off by up to 9e-4 of the amplitude."""
+    stiffness, velocity, amplitude, rate = 97.0, 1e-6, 1e-5, 200.0
+    phase = np.linspace(0, 2 * np.pi, 32, endpoint=False)
+    dense = np.linspace(0, 2 * np.pi, 1_000_001)
+    wave = np.sin(dense) + 0.3 * np.sin(2 * dense + 1)
+    for offset in np.linspace(0, 2 * np.pi / 32, 7):
+        angle = phase + offset
+        force = amplitude * (np.sin(angle) + 0.3 * np.sin(2 * angle + 1))
+        slope = amplitude * rate * (np.cos(angle) + 0.6 * np.cos(2 * angle + 1))
+        trace = np.zeros(len(angle), [(name, float) for name in TRACE_COLUMNS])
+        trace["time"], trace["spring_force"] = angle / rate, force
+        trace["drive_displacement"] = velocity * trace["time"]
+        trace["displacement"] = trace["drive_displacement"] - force / stiffness
+        trace["velocity"] = velocity - slope / stiffness
+        found = np.array([extreme(trace, 1), extreme(trace, -1)]) / amplitude
+        assert found == pytest.approx([wave.max(), wave.min()], abs=2.5e-5)
+
+
+@pytest.mark.parametrize("resolution", [0.5, 0.125])
+def test_cycles_at_resolutions_between(regular, resolution):
+    config = regular.config.replace({"run.resolution": resolution})
+    settled = settle(Motion(config), regular.state, regular.section)
+    words, count = _refined(config, settled, settled.words)
+    assert count == (0 if resolution == 0.5 else 6)
+    moved = time_of(words) - time_of(settled.words)
+    assert moved == pytest.approx(count * regular.period, rel=1e-3)
 
 
 @pytest.mark.long
@@ -385,6 +421,25 @@ def test_a_cycle_that_settles_slowly_is_not_irregular(regular):
     assert 9 < brief.number < 40
 
 
+@pytest.mark.parametrize(("growth", "motion"), [(1.0, "periodic"), (1.05, "irregular")])
+def test_a_fine_structure_is_that_of_a_cycle_unless_it_grows(regular, growth, motion):
+    class Made(Motion):
+        number = 0
+
+        def next_passage(self, words, _level):
+            self.number += 1
+            trace = regular._trace.copy()
+            part = 1e-3 * math.sin(2.4 * self.number) * growth ** (self.number - 30)
+            trace["spring_force"] *= 1 + part
+            end = self.number * regular.period
+            return Passage(words, end - regular.period, end, trace, trace[:0])
+
+    made = Made(regular.config)
+    found = settle(made, regular.state, regular.section, max_passages=30)
+    assert found.motion == motion
+    assert 30 <= made.number < 40
+
+
 def test_a_state_is_the_same_after_taking_it_apart(regular):
     archive = Archive(regular.state)
     assert np.array_equal(archive.words(), regular.state)
@@ -445,6 +500,21 @@ def test_passages_that_differ_by_their_errors_are_of_one_cycle(regular, alternat
     settled = {one for one, error in found[8:] if error < 1e-5}
     assert settled <= {multiple}
     assert run._spread()[0] == multiple
+
+
+@pytest.mark.parametrize("phase", np.linspace(0, np.pi, 9))
+def test_the_error_by_a_known_decay(phase):
+    """Where changes turn, two of them may be small by accident."""
+    run = _Settling(Motion(configuration()), None, None, 1e-5, 0.0, decay=0.6)
+    multiplier, period = 0.6 * np.exp(0.9j), 0.1
+    for number in range(20):
+        distance = 1e-3 * float(np.real(multiplier**number * np.exp(1j * phase)))
+        run._rows.append(np.array([period * (1 + distance), 1e-5, 2e-6]))
+        if number > 2:
+            multiple, error = run._multiple()
+            assert multiple == 1
+            assert abs(distance) < 2 * error
+            assert error < 20 * 1e-3 * 0.6**number
 
 
 @pytest.mark.parametrize(("alternation", "multiple"), [(1e-3, 1), (1e-2, 2)])

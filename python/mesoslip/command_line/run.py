@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import math
 import os
+import threading
+from contextlib import suppress
+from importlib import import_module
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -39,6 +42,8 @@ LARGE = 5e8
 LONG = 60.0
 # Rows of the trace that are read at once.
 MAX_ROWS = 400_000
+# Modules that are needed after a run only, and take long to import.
+LATER = ("mesoslip.output.writing", "mesoslip.output.files", "mesoslip.analysis.regime")
 
 
 def run(
@@ -71,7 +76,7 @@ def run(
     stopped by Ctrl-C, SIGTERM or SIGHUP. The same command with --resume continues from it.
     """
     from mesoslip.configuration.contacts.base import LOAD_CHANGE_SECONDS
-    from mesoslip.output import files, targets, writing
+    from mesoslip.output import targets
     from mesoslip.simulation.checkpoint import Checkpoint, checkpoint_folder
     from mesoslip.simulation.memory import check_memory, output_bytes
     from mesoslip.simulation.run_realizations import run_realizations
@@ -86,7 +91,7 @@ def run(
     def report(text: str) -> None:
         say(f"{path}: {text}")
 
-    if not quiet and files.is_of_another(path, checked):
+    if not quiet and _is_of_another(path, checked):
         report(
             "the output of another configuration will be replaced at the end; -o gives another name"
         )
@@ -107,6 +112,7 @@ def run(
         Checkpoint(folder, checked, interval=interval, resume=resume, report=report) as checkpoint,
         stopped_by_signals() as stop,
     ):
+        _import_meanwhile()
         try:
             with progress_shown(quiet) as progress:
                 results = run_realizations(
@@ -125,6 +131,8 @@ def run(
             ) from error
         if not results.complete:
             raise typer.Exit(_keep(results, path, stop, checkpoint))
+        from mesoslip.output import files, writing
+
         try:
             threads = workers or os.cpu_count() or 1
             with progress_shown(quiet, "writing") as progress:
@@ -141,6 +149,23 @@ def run(
             _report_results(results, checked, path, stop)
         files.remove_partial(_partial(path))
         checkpoint.remove()
+
+
+def _is_of_another(path: Path, config: Config) -> bool:
+    """Whether the run will replace the output of another configuration."""
+    if not os.path.lexists(path):
+        return False
+    from mesoslip.output import files
+
+    return files.is_of_another(path, config)
+
+
+def _import_meanwhile() -> None:
+    """Import what is needed after a run on a thread of its own, while kernels run."""
+    thread = threading.Thread(target=lambda: [import_module(one) for one in LATER], daemon=True)
+    # Without a thread they are imported when they are needed.
+    with suppress(MemoryError, RuntimeError):
+        thread.start()
 
 
 def _partial(path: Path) -> Path:

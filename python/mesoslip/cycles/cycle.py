@@ -38,6 +38,9 @@ LONG = 1e9
 # Resolution at which a motion settles first, to a tolerance, and maximum resolution for which it
 # does.
 COARSE, COARSE_TOLERANCE, MAX_FINE = 1.0, 3e-4, 0.5
+# Ratio of successive resolutions between that and the configuration's own, its minimum at the last
+# one, and the number of cycles at each: what differs by the resolution settles there at less cost.
+REFINEMENT, MIN_REFINEMENT, CYCLES_BETWEEN = 0.5, math.sqrt(2), 3
 # Cycles in which a motion settles after that; otherwise it is followed from its own start.
 FEW = 40
 # Initial states, by name.
@@ -154,6 +157,7 @@ def settled_cycle(
         *,
         is_coarse: bool = False,
         max_passages: int | None = None,
+        decay: float | None = None,
     ) -> Settled:
         return settle(
             motion,
@@ -165,6 +169,7 @@ def settled_cycle(
             tolerance=max(tolerance, COARSE_TOLERANCE) if is_coarse else tolerance,
             max_cycles=max_cycles,
             max_passages=max_passages,
+            decay=decay,
             progress=partial(report, is_coarse=is_coarse),
         )
 
@@ -178,7 +183,14 @@ def settled_cycle(
             coarse, back, coarse_cycles = _at_coarse(config, settled_at)
     if coarse is not None:
         few = None if back is None else FEW * coarse.multiple
-        settled = settled_at(motion, coarse.words, coarse.level, coarse.batches, max_passages=few)
+        settled = settled_at(
+            motion,
+            coarse.words,
+            coarse.level,
+            coarse.batches,
+            max_passages=few,
+            decay=None if back is None else back.decay(coarse.multiple),
+        )
         if back is not None and settled.motion != "periodic":
             settled = coarse = back = None
     if settled is None:
@@ -186,11 +198,13 @@ def settled_cycle(
     cycles = settled.cycles
     if back is None and (find_multipliers or begins_coarse):
         settled, back, cycles = _disturbed(motion, settled, settled_at, 10 * tolerance)
+        if back is not None:
+            settled = settled.with_decay(back.decay(settled.multiple))
     if settled.motion == "periodic":
         settled = settled.shortest()
     cycle = _cycle_of(config, settled, back if settled.motion == "periodic" else None, is_stable)
     if coarse is not None:
-        solver = f"{cycle.solver}, after {coarse_cycles} passages at resolution {COARSE:g}"
+        solver = f"{cycle.solver}, after {coarse_cycles} passages with longer steps"
         cycle = dataclasses.replace(cycle, coarse_cycles=coarse_cycles, solver=solver)
     followed = time_of(settled.words) - start
     return dataclasses.replace(cycle, cycles=cycles, followed=followed, is_continued=is_continued)
@@ -206,15 +220,32 @@ def _at_coarse(
     return after a disturbance, or at its own resolution does not settle soon, may not be that of
     the start.
     """
-    motion = Motion(_coarse(config))
+    motion = Motion(_with_resolution(config, COARSE))
     settled = settled_at(motion, None, None, is_coarse=True)
     if settled.motion == "irregular":
         return settled, None, settled.cycles
     back = after_disturbance(motion, settled) if settled.motion == "periodic" else None
     if back is None or not back.returns:
         return None, None, 0
-    settled = dataclasses.replace(settled, words=back.words, batches=())
-    return settled, back, settled.cycles + back.cycles * settled.multiple
+    words, between = _refined(config, settled, back.words)
+    count = settled.cycles + back.cycles * settled.multiple + between
+    return dataclasses.replace(settled, words=words, batches=()), back, count
+
+
+def _refined(config: Config, settled: Settled, words: Words) -> tuple[Words, int]:
+    """A state after some cycles at each resolution between the coarse one and the configuration's
+    own, and the number of passages."""
+    assert settled.level is not None
+    count, resolution = 0, COARSE * REFINEMENT
+    while resolution >= MIN_REFINEMENT * config.run.resolution:
+        motion = Motion(_with_resolution(config, resolution))
+        for _ in range(CYCLES_BETWEEN * settled.multiple):
+            passage = motion.next_passage(words, settled.level)
+            if passage is None:
+                break
+            words, count = passage.words, count + 1
+        resolution *= REFINEMENT
+    return words, count
 
 
 def _disturbed(
@@ -238,9 +269,9 @@ def _disturbed(
     return settled, back, cycles
 
 
-def _coarse(config: Config) -> Config:
-    """The configuration at the coarse resolution."""
-    return config.adapted(lambda one: one.replace({"run.resolution": COARSE}))
+def _with_resolution(config: Config, resolution: float) -> Config:
+    """The configuration at another resolution."""
+    return config.adapted(lambda one: one.replace({"run.resolution": resolution}))
 
 
 def _cycle_of(

@@ -38,6 +38,11 @@ class Return(NamedTuple):
     cycles: int
     """Number of computed cycles."""
 
+    def decay(self, multiple: int) -> float | None:
+        """Factor by which a disturbance of a cycle of some passages decays in one of them; None if
+        it is not known."""
+        return abs(self.multipliers[0]) ** (1 / multiple) if self.multipliers else None
+
 
 def after_disturbance(motion: Motion, settled: Settled) -> Return:
     """Disturb a settled cycle, and iterate until it returns."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from itertools import chain
+from itertools import chain, pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from mesoslip.array_types import Array
 from mesoslip.simulation.archive import entries
-from mesoslip.simulation.kernel import Kernel, Words
+from mesoslip.simulation.kernel import Kernel, Progress, Words
 from mesoslip.simulation.kernel_setup import NEVER, KernelSetup
 from mesoslip.simulation.recorded_tables import SLIP_COLUMNS, TRACE_COLUMNS, structured
 
@@ -28,6 +28,8 @@ SAMPLES_OF_RINGING = 32
 # Maximum number of advances after which the trace is searched for a passage once the force has been
 # low, minimum number near one, and part of the advances to an extrapolated one before the search.
 CHUNK, MIN_CHUNK, APPROACH = 128, 16, 0.8
+# Parts of the advances in a passage between which the next one is searched for its end.
+SEARCHED = 0.0, 0.8, 0.96, 0.99
 # Number of advances between two drains without a search.
 MANY = 65536
 # Level of the section, and level below which the force must have been, relative to its range.
@@ -90,12 +92,12 @@ class Passage:
     @property
     def peak(self) -> float:
         """Maximum of the spring force [N]."""
-        return extreme(self.trace["spring_force"])
+        return extreme(self.trace, 1)
 
     @property
     def low(self) -> float:
         """Minimum of the spring force [N]."""
-        return -extreme(-self.trace["spring_force"])
+        return extreme(self.trace, -1)
 
     @property
     def slip_duration(self) -> float:
@@ -103,14 +105,59 @@ class Passage:
         return float(np.sum(self.slips["end_time"] - self.slips["start_time"]))
 
 
-def extreme(values: Array) -> float:
-    """Maximum of samples of a smooth function, by a parabola."""
-    at = int(np.argmax(values))
-    if not 0 < at < len(values) - 1:
-        return float(values[at])
-    before, peak, after = (float(one) for one in values[at - 1 : at + 2])
-    bend = before - 2 * peak + after
-    return peak if bend >= 0 else peak - (after - before) ** 2 / (8 * bend)
+def extreme(trace: Trace, sign: int) -> float:
+    """Maximum (sign 1) or minimum (-1) of the spring force, by cubic interpolation with its rates.
+
+    A parabola through samples would depend on where they lie, by up to 1e-5 of the amplitude: as
+    much as the tolerance of a cycle.
+    """
+    force = sign * trace["spring_force"]
+    at, opposite = int(np.argmax(force)), int(np.argmin(force))
+    stretch = trace["drive_displacement"] - trace["displacement"]
+    if not 0 < at < len(force) - 1 or stretch[at] == stretch[opposite]:
+        return sign * float(force[at])
+    spring = (force[at] - force[opposite]) / (stretch[at] - stretch[opposite])
+    near = trace[at - 1 : at + 2]
+    drive_velocity = np.ptp(near["drive_displacement"]) / np.ptp(near["time"])
+    rates = spring * (drive_velocity - near["velocity"])
+    first = 1 if rates[1] > 0 else 0
+    duration = float(near["time"][first + 1] - near["time"][first])
+    cubic = Cubic(*force[at - 1 + first :][:2].tolist(), *(duration * rates[first:][:2]).tolist())
+    return sign * cubic.maximum()
+
+
+class Cubic(NamedTuple):
+    """A cubic polynomial of 0 to 1, by its values and slopes at both ends."""
+
+    start: float
+    end: float
+    start_slope: float
+    end_slope: float
+
+    def __call__(self, part: float) -> float:
+        """Its value."""
+        square, cube = self._coefficients
+        return self.start + part * (self.start_slope + part * (square + part * cube))
+
+    def slope(self, part: float) -> float:
+        """Its slope."""
+        square, cube = self._coefficients
+        return self.start_slope + part * (2 * square + 3 * part * cube)
+
+    def maximum(self) -> float:
+        """Its maximum; at an end unless it rises at the start and falls at the end."""
+        if not self.start_slope > 0 > self.end_slope:
+            return max(self.start, self.end)
+        square, cube = self._coefficients
+        root = math.sqrt(square**2 - 3 * cube * self.start_slope)
+        return self(self.start_slope / (root - square))
+
+    @property
+    def _coefficients(self) -> tuple[float, float]:
+        """Its coefficients of the square and the cube."""
+        rise = self.end - self.start
+        square = 3 * rise - 2 * self.start_slope - self.end_slope
+        return square, self.start_slope + self.end_slope - 2 * rise
 
 
 class Motion:
@@ -125,19 +172,18 @@ class Motion:
         self.interval = ringing / SAMPLES_OF_RINGING
         force = contacts.static_force
         self.loading_time = force * (1 / spring + 2 / contacts.stiffness) / abs(self.velocity)
-        self._chunk = int(CHUNK / math.sqrt(config.run.resolution))
+        # Advances before the next passage is searched, the first time as many as until its end.
+        self._expected = [int(CHUNK / math.sqrt(config.run.resolution))]
         self.setup_period = 2 * math.pi * math.sqrt(mass / spring)
         # Its contacts are copied, which is faster than making them again.
-        self._template = Kernel()
+        template = Kernel()
         kind = config.contact_kind
-        self._template.set_contacts(
-            kind.kernel_kind, kind.kernel_parameters(config), config.run.seed, 0
-        )
+        template.set_contacts(kind.kernel_kind, kind.kernel_parameters(config), config.run.seed, 0)
+        self._setup = KernelSetup(config, template, interval=self.interval)
 
     def open(self, words: Words | None, end_time: float = NEVER) -> Kernel:
         """A kernel at a state, or at the start, with a drive that ends at a time [s]."""
-        setup = KernelSetup(self.config, self._template, end_time=end_time, interval=self.interval)
-        kernel = setup.open()
+        kernel = self._setup.open(end_time=end_time)
         if words is None:
             kernel.start(self.config.contacts.initial)
         else:
@@ -164,13 +210,13 @@ class Motion:
     def next_passage(self, words: Words, level: Level) -> Passage | None:
         """Advance from a state to the next passage through a level; None if the maximum time is
         reached."""
-        start = time_of(words)
         kernel = self.open(words)
-        pieces = [_Piece(words, start, [], [])]
-        limit = start + MAX_LOADINGS * self.loading_time + MAX_PERIODS * self.setup_period
+        start = now = kernel.ask()
+        pieces = [_Piece(words, start.time, [], [])]
+        limit = start.time + MAX_LOADINGS * self.loading_time + MAX_PERIODS * self.setup_period
         search = _PassageSearch(level)
-        now, chunk = start, self._chunk
-        while now < limit:
+        chunk, *others = self._expected
+        while now.time < limit:
             kernel.advance(chunk, ANY_WORK)
             trace, slips = _taken(kernel)
             pieces[-1].traces.append(trace)
@@ -181,16 +227,19 @@ class Motion:
                 while pieces[-1].time >= found:
                     pieces.pop()
                 return self._cut(start, found, pieces)
-            before, now = now, kernel.ask().time
-            if search.has_been_low:
-                pieces.append(_Piece(kernel.save(), now, [], []))
+            before, now = now, kernel.ask()
+            if others or search.has_been_low:
+                pieces.append(_Piece(kernel.save(), now.time, [], []))
                 # The last piece is repeated: near a passage pieces are short.
-                chunk = search.advances_left(trace, chunk / (now - before))
+                chunk = search.advances_left(trace, chunk / (now.time - before.time))
+            if others:
+                chunk = others.pop(0)
         kernel.close()
         return None
 
-    def _cut(self, start: float, time: float, pieces: list[_Piece]) -> Passage:
-        """The motion up to a passage at a time [s], for which the last piece is repeated."""
+    def _cut(self, start: Progress, time: float, pieces: list[_Piece]) -> Passage:
+        """The motion up to a passage at a time [s], for which the last piece is repeated; the next
+        passage is expected to take as many advances."""
         last = pieces.pop()
         kernel = self.open(last.words, time)
         while not kernel.ask().ending:
@@ -198,13 +247,19 @@ class Motion:
         trace, slips = _taken(kernel)
         traces = [*chain.from_iterable(one.traces for one in pieces), trace]
         catalogues = [*chain.from_iterable(one.slips for one in pieces), slips]
+        self._expect(kernel.ask().advances - start.advances)
         return Passage(
             self._saved(kernel),
-            start,
+            start.time,
             time,
             structured(np.concatenate(traces), TRACE_COLUMNS),
             structured(np.concatenate(catalogues), SLIP_COLUMNS),
         )
+
+    def _expect(self, advances: int) -> None:
+        """Set the advances before each search for the next passage, the last ones close to it."""
+        ends = [int(part * advances) for part in SEARCHED]
+        self._expected = [max(1, end - begin) for begin, end in pairwise(ends)]
 
 
 def _taken(kernel: Kernel) -> tuple[Array, Array]:
@@ -265,22 +320,13 @@ class _PassageSearch:
         drive = late[DRIVE] - early[DRIVE]
         spring = rise / (drive - (late[DISPLACEMENT] - early[DISPLACEMENT]))
         slope = spring * (drive - duration * np.array([early[VELOCITY], late[VELOCITY]]))
+        cubic = Cubic(*force.tolist(), *slope.tolist())
         part = (self._level.force - force[0]) / rise
         for _ in range(NEWTON_STEPS):
-            value = (
-                force[0]
-                + part * slope[0]
-                + part**2 * (3 * rise - 2 * slope[0] - slope[1])
-                + part**3 * (slope[0] + slope[1] - 2 * rise)
-            )
-            change = (
-                slope[0]
-                + 2 * part * (3 * rise - 2 * slope[0] - slope[1])
-                + 3 * part**2 * (slope[0] + slope[1] - 2 * rise)
-            )
+            change = cubic.slope(part)
             if change <= 0:
                 break
-            part = min(1.0, max(0.0, part - (value - self._level.force) / change))
+            part = min(1.0, max(0.0, part - (cubic(part) - self._level.force) / change))
         return float(early[TIME] + part * duration)
 
 

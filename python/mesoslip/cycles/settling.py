@@ -39,6 +39,8 @@ SHRINKING, SETTLING, SLOWLY = 0.98, 0.5, 0.9
 EQUAL_SPREAD, EQUAL_CHANGE = 3.0, 10.0
 # Passages of a motion whose changes still shrink, over the maximum number of those of others.
 SLOW_PASSAGES = 3
+# Range of the distance to the limit over the last change, where the decay is known.
+MIN_DISTANCE, MAX_DECAY = 0.5, 0.97
 # Amplitude over F_s below which sliding is smooth.
 MIN_AMPLITUDE = 1e-3
 # Time before the first section, in times of loading plus periods of the setup.
@@ -86,6 +88,14 @@ class Settled:
         limit = max(tolerance, SAME_ERRORS * (self.error + other.error))
         return float(max(changes)) < limit
 
+    def with_decay(self, decay: float | None) -> Settled:
+        """The cycle with an error that agrees with the decay of a disturbance in a passage."""
+        if decay is None or len(self.rows) < 2 * self.multiple + 1:
+            return self
+        last, before = _last_changes(self.rows, self.multiple)
+        error = _distance(last, before, decay**self.multiple)
+        return dataclasses.replace(self, error=max(self.error, error))
+
     def shortest(self) -> Settled:
         """The cycle with the fewest passages that differ by no more than a fine structure."""
         period, peak, low = self.rows[-1]
@@ -97,6 +107,34 @@ class Settled:
                 passages, error = self.passages[-part:], max(self.error, change)
                 return dataclasses.replace(self, multiple=part, passages=passages, error=error)
         return self
+
+
+def _changes(rows: Array, multiple: int, min_amplitude: float = 0.0) -> Array:
+    """Relative changes of period, peak and low over cycles of some passages, shape (n, 3)."""
+    changes: Array = rows[multiple:] - rows[:-multiple]
+    amplitude = max(float(rows[-1, 1] - rows[-1, 2]), min_amplitude)
+    changes /= np.array([float(rows[-1, 0]), amplitude, amplitude])
+    return changes
+
+
+def _last_changes(rows: Array, multiple: int, min_amplitude: float = 0.0) -> tuple[float, float]:
+    """The largest change over the last cycle of some passages, and over the one before."""
+    sizes = np.max(np.abs(_changes(rows, multiple, min_amplitude)), axis=1)
+    last = float(np.max(sizes[-multiple:]))
+    return last, float(np.max(sizes[: len(sizes) - multiple][-multiple:], initial=0.0))
+
+
+def _distance(last: float, before: float, decay: float | None) -> float:
+    """Distance of a cycle to its limit by its last two changes, and the decay in a cycle.
+
+    The ratio of changes may be small by accident: where the decay is known, none is taken to be
+    smaller than the remainder of the one before.
+    """
+    if decay is None:
+        factor = min(0.99, last / before) if before > 0 else 0.9
+        return max(1.0, factor / (1 - factor)) * last
+    factor = min(MAX_DECAY, decay)
+    return max(last, factor * before) * max(MIN_DISTANCE, factor / (1 - factor))
 
 
 def _extremes(rows: Array) -> Array:
@@ -115,6 +153,7 @@ def settle(
     tolerance: float = TOLERANCE,
     max_cycles: int = MAX_CYCLES,
     max_passages: int | None = None,
+    decay: float | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Settled:
     """Iterate a motion to its settled state, from a state with a section that may fit, or from the
@@ -125,10 +164,10 @@ def settle(
     compared with itself later, and with the batches of a motion that led to the state and did not
     settle at a coarse resolution. ``progress`` is called with the passages over that number.
     With ``max_passages`` a motion that needs more is irregular, three times as many where its
-    changes still shrink.
+    changes still shrink. The factor by which a disturbance decays in a passage may be known.
     """
     start = 0.0 if words is None else time_of(words)
-    run = _Settling(motion, is_stable, root, tolerance, start, max_passages)
+    run = _Settling(motion, is_stable, root, tolerance, start, max_passages, decay)
     run.continue_after(batches, max_cycles)
     if words is None or level is None:
         words, trace = motion.advance(words, run.window)
@@ -157,9 +196,10 @@ class _Settling:
         tolerance: float,
         start: float,
         max_passages: int | None = None,
+        decay: float | None = None,
     ) -> None:
         self._motion, self._is_stable, self._tolerance = motion, is_stable, tolerance
-        self._start, self._max_passages = start, max_passages
+        self._start, self._max_passages, self._decay = start, max_passages, decay
         self._amplitudes = Amplitudes(motion.velocity, is_stable, root)
         self._force = motion.config.contacts.static_force
         self.window = LOADINGS * motion.loading_time + PERIODS * motion.setup_period
@@ -227,7 +267,8 @@ class _Settling:
                     return words, Level.of(force), ""
                 return words, level, "periodic"
         if self._max_passages:
-            return words, level, "irregular"
+            stays = self._spread()[1] < MAX_SPREAD and self._trend() < 1 / SLOWLY
+            return words, level, "periodic" if stays else "irregular"
         self._amplitudes.end_batch()
         if self._amplitudes.fall_between_batches():
             return words, None, "smooth"
@@ -260,9 +301,13 @@ class _Settling:
         """Whether the changes over a cycle still shrink, of a motion with a maximum of passages."""
         if self._count >= SLOW_PASSAGES * (self._max_passages or 0) or len(self._rows) < 6:
             return False
+        return self._trend() < SLOWLY
+
+    def _trend(self) -> float:
+        """The changes over a cycle in the last third of the passages, over those in the middle."""
         sizes = np.max(np.abs(self._differences(self._multiple()[0])), axis=1)
         _, middle, late = (float(np.median(one)) for one in np.array_split(sizes, 3))
-        return late < SLOWLY * middle
+        return late / max(middle, 1e-300)
 
     def _spread(self) -> tuple[int, float]:
         """Number of passages in a cycle with the smallest relative spread, and that spread."""
@@ -300,12 +345,8 @@ class _Settling:
         return force
 
     def _differences(self, multiple: int) -> Array:
-        """Relative changes of period, peak and low over cycles of some passages, shape (n, 3)."""
-        rows = np.array(self._rows)
-        changes: Array = rows[multiple:] - rows[:-multiple]
-        amplitude = max(float(rows[-1, 1] - rows[-1, 2]), 1e-9 * self._force)
-        changes /= np.array([float(rows[-1, 0]), amplitude, amplitude])
-        return changes
+        """See `_changes`."""
+        return _changes(np.array(self._rows), multiple, 1e-9 * self._force)
 
     def _multiple(self) -> tuple[int, float]:
         """Number of passages in a cycle, and the estimated relative error of its period and peaks.
@@ -317,14 +358,12 @@ class _Settling:
         for multiple in range(1, MAX_MULTIPLE + 1):
             if len(self._rows) < 2 * multiple + 1 or (multiple > 1 and is_shrinking):
                 break
-            sizes = np.max(np.abs(self._differences(multiple)), axis=1)
-            last = float(np.max(sizes[-multiple:]))
-            before = float(np.max(sizes[: len(sizes) - multiple][-multiple:], initial=0.0))
+            last, before = _last_changes(np.array(self._rows), multiple, 1e-9 * self._force)
             is_shrinking = is_shrinking or last < SHRINKING * before
-            factor = min(0.99, last / before) if before > 0 else 0.9
             first = last if multiple == 1 else first
             if multiple == 1 or first > EQUAL_CHANGE * last:
-                found.append((max(1.0, factor / (1 - factor)) * last, multiple))
+                decay = None if self._decay is None else self._decay**multiple
+                found.append((_distance(last, before, decay), multiple))
         if not found:
             return 1, math.inf
         settled = [one for one in found if one[0] < self._tolerance]

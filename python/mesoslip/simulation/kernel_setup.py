@@ -22,8 +22,8 @@ class KernelSetup:
     """The parts of the kernels of a configuration, of which realizations differ in the contacts.
 
     Contacts may be copied from another kernel. A run that continues another has ``start_time`` [s],
-    until which the drive has an additional part, and ``earlier_slips``. ``end_time`` [s] of the
-    drive and ``interval`` [s] of the trace replace those of the configuration.
+    until which the drive has an additional part, and ``earlier_slips``. The ``interval`` [s] of the
+    trace replaces that of the configuration.
     """
 
     def __init__(
@@ -32,7 +32,6 @@ class KernelSetup:
         parameters: Parameters | Kernel,
         *,
         start_time: float | None = None,
-        end_time: float | None = None,
         interval: float | None = None,
         earlier_slips: int = 0,
     ) -> None:
@@ -50,8 +49,6 @@ class KernelSetup:
             np.array(numbers) for numbers in zip(*parts, strict=True)
         )
         ends = np.minimum(np.cumsum(durations), NEVER)
-        if end_time is not None:
-            ends[-1] = min(end_time, NEVER)
         self._drive = ends, start_velocities, end_velocities, stages
         self._forces = None if forces is None else np.array(forces)
         self._stop: dict[str, Any] = {
@@ -68,7 +65,6 @@ class KernelSetup:
             "slip_interval": config.slip_interval or 0.0,
             "slip_velocity": slider.slip_velocity(config),
             "quiet_time": slider.quiet_time,
-            "duration": float(ends[-1]),
             "layers": slider.layers_recorded(config),
             "blocks": slider.block_count,
         }
@@ -79,19 +75,23 @@ class KernelSetup:
             "snapshot_times": (start_time or 0.0) + np.array(output.snapshots, dtype=float),
         }
 
-    def open(self, number: int = 0) -> Kernel:
-        """A kernel of a realization that can be started or restored."""
+    def open(self, number: int = 0, *, end_time: float | None = None) -> Kernel:
+        """A kernel of a realization that can be started or restored; ``end_time`` [s] of the drive
+        replaces that of the configuration."""
+        ends, *rates_and_stages = self._drive
+        if end_time is not None:
+            ends = np.append(ends[:-1], min(end_time, NEVER))
         kernel = Kernel()
         if isinstance(self._parameters, Kernel):
             kernel.copy_contacts(self._parameters)
         else:
             kernel.set_contacts(self._contacts, self._parameters, self._seed, number)
         kernel.set_slider(*self._slider)
-        kernel.set_drive(*self._drive)
+        kernel.set_drive(ends, *rates_and_stages)
         if self._forces is not None:
             kernel.set_drive_values(self._forces)
         kernel.set_stop(**self._stop)
-        kernel.set_recorder(**self._recorder)
+        kernel.set_recorder(**self._recorder, duration=float(ends[-1]))
         kernel.set_avalanches(**self._avalanches)
         return kernel
 

@@ -15,7 +15,6 @@ from mesoslip.analysis.regime.events import MIN_CYCLES, NO_SLIPS, Slips
 from mesoslip.analysis.regime.result import NAMES, REGIME, SMOOTH, TRANSIENT, RegimeResult
 from mesoslip.analysis.regime.rules import classify
 from mesoslip.analysis.regime.scales import Scales, Stage, measured_stage, stage_of
-from mesoslip.analysis.strokes import Piece, output_pieces, sliding_of
 from mesoslip.array_types import Array, Dataset, DataTree
 from mesoslip.output.access import group_of, is_measured
 from mesoslip.output.arrays import Tree
@@ -23,6 +22,7 @@ from mesoslip.output.inputs import OutputLike, opened_run
 from mesoslip.simulation.recorded_tables import SLIP_COLUMNS, TRACE_COLUMNS
 
 if TYPE_CHECKING:
+    from mesoslip.analysis.strokes import Piece
     from mesoslip.simulation.run_realizations import Results
 
 
@@ -67,7 +67,7 @@ def judge(tree: Tree, name: str = "the output") -> tuple[list[RegimeResult], str
     for number in range(root.sizes["realization"]):
         mine = owner == number
         own = slips.of(mine)
-        pieces = output_pieces(tree, number)[0] if is_measured(tree) else None
+        pieces = _pieces(tree, number)
         if pieces is None:
             results.append(classify(*_window(tree, number, apparatus), own))
         else:
@@ -81,6 +81,16 @@ def judge(tree: Tree, name: str = "the output") -> tuple[list[RegimeResult], str
 
     motion, is_creep = motion_under_force(Experiment(tree, name))
     return [RegimeResult(SMOOTH if is_creep else TRANSIENT)] * len(results), motion
+
+
+def _pieces(tree: Tree, number: int) -> Sequence[Piece] | None:
+    """The strokes of a measured trace; None if it has none."""
+    if not is_measured(tree):
+        return None
+    # Runs do without, which would take longer to import than their regimes.
+    from mesoslip.analysis.strokes import output_pieces
+
+    return output_pieces(tree, number)[0]
 
 
 def _slips(tree: Tree) -> tuple[Array, Slips]:
@@ -128,6 +138,8 @@ def _in_strokes(
     The parts between reversals are put one after the other, in time too, with forces along the
     motion. Without slips they are smooth, however the friction depends on the position.
     """
+    from mesoslip.analysis.strokes import sliding_of
+
     root = tree.to_dataset()
     time, force = root["time"].values, root[apparatus.force_name][number].values
     sliding = sliding_of(force, pieces)

@@ -1,7 +1,5 @@
 """Short runs of every kind, for what must hold of all of them: some ten thousand events each."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from itertools import combinations
 from typing import Any

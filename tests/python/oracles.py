@@ -3,8 +3,6 @@
 None of them shares code with the kernels, but for Philox, which is checked by known answers.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 

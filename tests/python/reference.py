@@ -2,8 +2,6 @@
 curves and onsets; and how an output differs from its reference.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Friction of activated contacts: creep, holds, restarts, and the stability of steady sliding."""
 
-from __future__ import annotations
-
 import math
 import re
 

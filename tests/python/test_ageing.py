@@ -1,7 +1,5 @@
 """Contacts that age: limits, independent models, the steady force, and what is refused."""
 
-from __future__ import annotations
-
 import functools
 import itertools
 import math

@@ -1,7 +1,5 @@
 """The functions of the package: names, what they take, and errors."""
 
-from __future__ import annotations
-
 import math
 import subprocess
 import sys

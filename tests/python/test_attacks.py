@@ -1,7 +1,5 @@
 """Damaged files, odd streams, outputs in the place of inputs: one message, nothing destroyed."""
 
-from __future__ import annotations
-
 import functools
 import os
 import pydoc

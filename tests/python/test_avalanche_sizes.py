@@ -1,7 +1,5 @@
 """Histograms and power laws of avalanche sizes against brute force, scipy and known laws."""
 
-from __future__ import annotations
-
 import functools
 import itertools
 import json

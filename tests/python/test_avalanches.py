@@ -1,7 +1,5 @@
 """Sizes of avalanches against the theory of branching processes and of fibre bundles."""
 
-from __future__ import annotations
-
 import itertools
 import json
 import math

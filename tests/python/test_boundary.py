@@ -1,7 +1,5 @@
 """What crosses the boundary to Fortran, by its name on both sides."""
 
-from __future__ import annotations
-
 import ast
 import re
 import subprocess

@@ -1,7 +1,5 @@
 """The b-value, Omori's decay, and a second channel beside slips."""
 
-from __future__ import annotations
-
 import json
 
 import mesoslip

@@ -1,7 +1,5 @@
 """The command line: what it makes, and one clear message for every mistake."""
 
-from __future__ import annotations
-
 import contextlib
 import csv
 import json

@@ -1,7 +1,5 @@
 """Configurations: what is accepted, what is refused, and with which words."""
 
-from __future__ import annotations
-
 import contextlib
 import math
 import os

@@ -1,7 +1,5 @@
 """The settled cycle of the master equation."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 import math

@@ -5,8 +5,6 @@ Blocks are gone through as a reader does, in an empty folder (README: in a clone
 parts of a file. Of a block after ``not run: reason`` commands are parsed, and no more is done.
 """
 
-from __future__ import annotations
-
 import doctest
 import json
 import re

@@ -1,7 +1,5 @@
 """The drive as an experimenter gives it, and what its stages came to."""
 
-from __future__ import annotations
-
 import itertools
 import math
 

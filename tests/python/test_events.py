@@ -1,7 +1,5 @@
 """The event-driven run against independent models of the same contacts."""
 
-from __future__ import annotations
-
 import mesoslip
 import numpy as np
 import pytest

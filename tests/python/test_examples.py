@@ -1,7 +1,5 @@
 """What comes with the program: its runs in the wheel, and what a missing library reports."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from importlib.metadata import files

@@ -1,7 +1,5 @@
 """Executors, their store and their stop: nothing is lost, and files of others stay as they are."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal

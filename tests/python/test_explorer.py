@@ -1,7 +1,5 @@
 """The explorer without a page: what was changed, runs that are shown, numbers to draw."""
 
-from __future__ import annotations
-
 import asyncio
 import functools
 import gc

@@ -1,7 +1,5 @@
 """Measured stick-slip in any unit, direction and time, from the file to the picture."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Fits: the machinery on problems whose posterior is known, and traces whose truth is."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

@@ -1,7 +1,5 @@
 """Fits of traces as they are measured: noise, several traces, misfits in words, predictions."""
 
-from __future__ import annotations
-
 import math
 import re
 

@@ -1,7 +1,5 @@
 """A slider under a force: closed forms, conservation, and the force curve."""
 
-from __future__ import annotations
-
 import math
 import tomllib
 

@@ -1,7 +1,5 @@
 """The response of a slider under a force: creep, static friction, the motion in words."""
 
-from __future__ import annotations
-
 import json
 import math
 

@@ -1,7 +1,5 @@
 """Outputs of others: nothing outside of them is read; and reading on many threads."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import struct

@@ -1,7 +1,5 @@
 """Slips found in traces with noise of every kind, and what lies between them."""
 
-from __future__ import annotations
-
 import math
 
 import mesoslip

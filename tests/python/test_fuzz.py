@@ -1,7 +1,5 @@
 """A small part of the attack (tests/fuzz), always the same; and what it must be able to see."""
 
-from __future__ import annotations
-
 import signal
 import subprocess
 import sys

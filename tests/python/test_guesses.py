@@ -1,7 +1,5 @@
 """Each guess about a file, where it is wrong: it is printed, and one option overrules it."""
 
-from __future__ import annotations
-
 import mesoslip
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Files as instruments write them: each is a small made one in the form of its instrument."""
 
-from __future__ import annotations
-
 import h5py
 import mesoslip
 import netCDF4

@@ -1,7 +1,5 @@
 """Contacts that push their neighbours over, and the slider without inertia."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

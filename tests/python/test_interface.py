@@ -1,7 +1,5 @@
 """An interface with a length: exact checks of the model, and a plain code of the same contacts."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Lyapunov exponents and return maps against closed forms."""
 
-from __future__ import annotations
-
 import json
 import math
 

@@ -1,7 +1,5 @@
 """What make finds stale: an output after an edit of its run, or of any file that is based on."""
 
-from __future__ import annotations
-
 import os
 import runpy
 import shutil

@@ -1,7 +1,5 @@
 """Files that are parts of one test, and files that are read with one description."""
 
-from __future__ import annotations
-
 import csv
 
 import mesoslip

@@ -1,7 +1,5 @@
 """The master equation under a moving slider, against its force curve and against N contacts."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from conftest import at_end, long

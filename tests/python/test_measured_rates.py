@@ -1,7 +1,5 @@
 """Rates and states of measured traces, against motions of another integrator."""
 
-from __future__ import annotations
-
 import json
 import math
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Files of measurements: every style of a laboratory, units, samples at any times, damages."""
 
-from __future__ import annotations
-
 import gzip
 import tracemalloc
 import zipfile

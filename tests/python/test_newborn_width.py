@@ -1,7 +1,5 @@
 """Contacts that attach with forces of a normal law."""
 
-from __future__ import annotations
-
 import functools
 
 import mesoslip

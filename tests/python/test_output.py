@@ -1,7 +1,5 @@
 """Outputs: one layout in memory and in files, which every method of xarray can handle."""
 
-from __future__ import annotations
-
 import fcntl
 import os
 import platform

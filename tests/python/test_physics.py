@@ -1,7 +1,5 @@
 """Closed forms, conservation, and what a result must not depend on."""
 
-from __future__ import annotations
-
 import mesoslip
 import numpy as np
 import pytest

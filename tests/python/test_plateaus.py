@@ -1,7 +1,5 @@
 """Plateaus of speed, load and force: means, errors that know correlation, Stribeck's curve."""
 
-from __future__ import annotations
-
 import json
 import math
 

@@ -1,7 +1,5 @@
 """Pictures: what they show, what they read, and how they are had without files."""
 
-from __future__ import annotations
-
 import re
 import threading
 

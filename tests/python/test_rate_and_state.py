@@ -1,7 +1,5 @@
 """Rate-and-state friction: motions of a spring and slider, and laws fitted to records of runs."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

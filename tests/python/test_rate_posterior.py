@@ -1,7 +1,5 @@
 """The posterior of rates and states: its density, its draws, its table and its file."""
 
-from __future__ import annotations
-
 import json
 import math
 from dataclasses import replace

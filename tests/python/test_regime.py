@@ -1,7 +1,5 @@
 """The regime of motion: its rules, and runs of every kind."""
 
-from __future__ import annotations
-
 import dataclasses
 import importlib.util
 import json

@@ -1,7 +1,5 @@
 """The tools of a release: they find what is wrong, and change all files or none."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Reports: all that an output holds on a page that needs nothing else."""
 
-from __future__ import annotations
-
 import html
 import re
 from html.parser import HTMLParser

@@ -1,7 +1,5 @@
 """Steady forces, velocity steps and holds of records whose laws are known."""
 
-from __future__ import annotations
-
 import csv
 import json
 import math

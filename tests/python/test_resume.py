@@ -1,7 +1,5 @@
 """Runs that are stopped and taken up again are the same to the bit."""
 
-from __future__ import annotations
-
 import errno
 import gc
 import json

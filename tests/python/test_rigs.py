@@ -1,7 +1,5 @@
 """The examples of measured files: the numbers of the page "From your rig to a table"."""
 
-from __future__ import annotations
-
 import mesoslip
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """The catalogue of slips: what a person would mark in the trace, and nothing else."""
 
-from __future__ import annotations
-
 import csv
 import json
 

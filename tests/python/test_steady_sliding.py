@@ -1,7 +1,5 @@
 """Linear stability of steady sliding with delay, against independent formulas and runs."""
 
-from __future__ import annotations
-
 import importlib.util
 import math
 import sys

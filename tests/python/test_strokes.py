@@ -1,7 +1,5 @@
 """Records that go back and forth: strokes, and slips between reversals."""
 
-from __future__ import annotations
-
 import json
 import math
 

@@ -1,7 +1,5 @@
 """Sweeps: their points, measures, store, and that nothing but the file decides the numbers."""
 
-from __future__ import annotations
-
 import itertools
 import json
 import os

@@ -1,7 +1,5 @@
 """Sweeps and runs on a Dask cluster: a real scheduler and workers, as processes of their own."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal

@@ -1,7 +1,5 @@
 """Sweeps that are killed, stopped, or meet a disk that fails: nothing is lost."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import signal

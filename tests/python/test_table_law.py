@@ -1,7 +1,5 @@
 """Threshold laws of a table, such as measured areas of contacts."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import mesoslip

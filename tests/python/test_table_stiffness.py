@@ -1,7 +1,5 @@
 """Threshold tables with a stiffness for each threshold."""
 
-from __future__ import annotations
-
 import mesoslip
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Thermally activated breaking: closed forms, a fixed step, limits, configuration."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

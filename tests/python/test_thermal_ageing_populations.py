@@ -1,7 +1,5 @@
 """Infinitely many contacts that age and break by thermal activation: closed forms and limits."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

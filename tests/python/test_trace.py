@@ -1,7 +1,5 @@
 """Measured traces: read from tables, and the slips found in them against the exact catalogue."""
 
-from __future__ import annotations
-
 import functools
 import json
 import re

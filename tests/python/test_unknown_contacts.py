@@ -4,8 +4,6 @@ The key `contacts.softening` is planted into the configuration of a program of i
 answer for it has to say so: kinds of the kernel, theories, reports.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

@@ -3,8 +3,6 @@
 python tests/studies/event_coverage.py [COUNT]
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 import sys

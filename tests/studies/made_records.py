@@ -11,8 +11,6 @@ same. The rule was written with the records of which `is_for_design` is true, ha
 prints recall and precision by kind, and by force drop over noise, of both halves.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 import sys

@@ -10,8 +10,6 @@ later. Prints the table of ``docs/regimes.md``::
     .venv/bin/python tests/studies/marked_motions.py [set] [figure]
 """
 
-from __future__ import annotations
-
 import json
 import math
 import sys

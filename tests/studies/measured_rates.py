@@ -6,8 +6,6 @@ Prints the share of records within three errors, that of 95 % intervals that con
 the records that do not. Usage: measured_rates.py [RECORDS] [FIRST_SEED]
 """
 
-from __future__ import annotations
-
 import math
 import sys
 import time as clock

@@ -7,8 +7,6 @@ its law, and the share of 90 % intervals that cover, also of those records alone
 describes. Usage: rate_posterior.py [RECORDS] [FIRST_SEED] [SAMPLES]
 """
 
-from __future__ import annotations
-
 import sys
 import time as clock
 from dataclasses import replace

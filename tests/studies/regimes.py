@@ -13,8 +13,6 @@ The table is that of 360 points, which take three minutes; ``tests/python/test_r
 fewer.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 import sys

@@ -6,8 +6,6 @@ Prints the tables of ``docs/response.md``::
     .venv/bin/python tests/studies/response_coverage.py [steady] [runs] [fits]
 """
 
-from __future__ import annotations
-
 import sys
 from dataclasses import replace
 

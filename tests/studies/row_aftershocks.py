@@ -6,8 +6,6 @@ Contacts without and with ageing and temperature (Braun and Tosatti, Phys. Rev. 
     python tests/studies/row_aftershocks.py [REALIZATIONS [VELOCITY [DISPLACEMENT]]]
 """
 
-from __future__ import annotations
-
 import sys
 
 import mesoslip

@@ -10,8 +10,6 @@ Three comparisons, whose numbers stand in ``docs/steady-sliding.md``::
     .venv/bin/python tests/studies/steady_sliding.py map [figure]  # the boundary, and runs
 """
 
-from __future__ import annotations
-
 import math
 import sys
 from typing import Any

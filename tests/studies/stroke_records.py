@@ -11,8 +11,6 @@ values are within the stated errors (95 %)::
     .venv/bin/python tests/studies/stroke_records.py 200 400
 """
 
-from __future__ import annotations
-
 import argparse
 import math
 import tempfile

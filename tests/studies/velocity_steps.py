@@ -7,8 +7,6 @@ Laws are fitted for a rigid interface, and with the stiffness of the contacts in
     .venv/bin/python tests/studies/velocity_steps.py [figure]
 """
 
-from __future__ import annotations
-
 import math
 import sys
 from pathlib import Path

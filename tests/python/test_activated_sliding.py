@@ -351,7 +351,7 @@ def test_drag_is_part_of_the_direct_effect():
         stage = [{"duration": d / one, "velocity": one} for d, one in stages]
         tables["drive"] = {"stage": stage}
         tables["output"] = {"interval": 1e-3 * length / velocity}
-        tree = mesoslip.run(Config.from_dict(tables))
+        tree = mesoslip.run(tables)
         moved = tree["displacement"].values[0] - 14 * length
         jumps.append(np.interp(2e-3 * length, moved, tree["contact_force"].values[0]))
     direct = (jumps[0] - jumps[1]) / logarithm

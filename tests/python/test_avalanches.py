@@ -176,16 +176,16 @@ def test_a_force_beyond_what_sliding_contacts_bear_is_reported(command, tmp_path
     tables = bundle(1000, 1).to_dict()
     tables["contacts"]["reattach"] = True
     tables["run"] = {"duration": 40.0}
-    tree = mesoslip.run(Config.from_dict(tables))
+    tree = mesoslip.run(tables)
     assert tree.attrs["ending"].startswith("contacts break under the force without end; breaks")
     assert tree.attrs["complete"] == "true"
     # Rebirth makes the contacts no stronger than in their stationary state, within fluctuations.
-    steady = mesoslip.derived(Config.from_dict(tables))["F_steady"].value
+    steady = mesoslip.derived(tables)["F_steady"].value
     peak = mesoslip.avalanche_summary(tree)["bundle_strength"]
     assert 0.9 * steady < peak < 1.2 * steady
     # The slide without end is no avalanche; and the force curve needs no spring.
     assert mesoslip.avalanches(tree)["size"].values.max() < 1000 * 1000
-    assert np.isfinite(mesoslip.curve(Config.from_dict(tables)).attrs["K_star"])
+    assert np.isfinite(mesoslip.curve(tables).attrs["K_star"])
     # So sizes do not add up to the breaks, and it is reported by how many.
     summary = mesoslip.avalanche_summary(tree)
     assert summary["breaks_outside"] > 1000 * 1000
@@ -204,7 +204,7 @@ def test_runs_end_by_avalanches_or_by_the_drive():
     tables = sliding(200.0, 500).to_dict()
     start = by_count["drive_displacement"].values[0, 0]
     tables["run"] = {"drive_displacement": 2e-10}
-    by_way = mesoslip.run(Config.from_dict(tables))
+    by_way = mesoslip.run(tables)
     assert by_way.attrs["ending"] == "end of the drive"
     np.testing.assert_allclose(by_way["drive_displacement"].values[0, -1] - start, 2e-10, rtol=1e-6)
     # The same run as far as both go.
@@ -220,7 +220,7 @@ def test_small_avalanches_may_be_left_out():
     everything = mesoslip.run(sliding(200.0, 2000))
     tables = sliding(200.0, 2000).to_dict()
     tables["output"] = {"avalanche_size": 20}
-    large = mesoslip.run(Config.from_dict(tables))
+    large = mesoslip.run(tables)
     sizes = everything["avalanches"]["size"].values
     np.testing.assert_array_equal(large["avalanches"]["size"].values, sizes[sizes >= 20])
     assert large["avalanche_count"].item() == 2000

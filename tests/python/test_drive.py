@@ -126,16 +126,12 @@ def test_a_ramp_of_a_prescribed_slider():
     start, end, duration = 1e-6, -2e-6, 3e-3
     acceleration = (end - start) / duration
     tree = mesoslip.run(
-        Config.from_dict(
-            klein_tables(
-                run__duration=None,
-                slider={"kind": "prescribed"},
-                contacts__coupling="equal",
-                output__interval=1e-5,
-                drive={
-                    "stage": [{"duration": duration, "start_velocity": start, "end_velocity": end}]
-                },
-            )
+        klein_tables(
+            run__duration=None,
+            slider={"kind": "prescribed"},
+            contacts__coupling="equal",
+            output__interval=1e-5,
+            drive={"stage": [{"duration": duration, "start_velocity": start, "end_velocity": end}]},
         )
     )
     time = tree["time"].values
@@ -164,13 +160,11 @@ def test_extremes_of_a_spring_under_ramps():
         {"duration": 0.01, "hold": True},
     ]
     tree = mesoslip.run(
-        Config.from_dict(
-            klein_tables(
-                run__duration=None,
-                contacts__coupling="equal",
-                contacts__static_force=1e-3,
-                drive={"stage": stages},
-            )
+        klein_tables(
+            run__duration=None,
+            contacts__coupling="equal",
+            contacts__static_force=1e-3,
+            drive={"stage": stages},
         )
     )
     assert tree["breaks"].values == 0
@@ -483,7 +477,7 @@ def test_a_run_ends_at_a_displacement_where_forces_change_their_sign():
         contacts__initial="steady",
         contacts__thermal={"rate": 1e3, "force_ratio": 0.01},
     )
-    tree = mesoslip.run(Config.from_dict(config))
+    tree = mesoslip.run(config)
     assert stages_of(tree)["end_displacement"].values[-1] == distance
 
 

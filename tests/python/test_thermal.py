@@ -459,7 +459,7 @@ def test_contacts_reach_their_thresholds_after_a_reversal(seed):
     thermal = {"rate": 1e-17, "force_ratio": 2.0}
     warm = tables | {"contacts": tables["contacts"] | {"thermal": thermal}}
     cold = tables | {"contacts": tables["contacts"] | {"thermal": None}}
-    actual, expected = (mesoslip.run(Config.from_dict(one))["energy"] for one in (warm, cold))
+    actual, expected = (mesoslip.run(one)["energy"] for one in (warm, cold))
     for term in ("drive_work", "break_loss"):
         assert float(actual[term].values[0]) == pytest.approx(
             float(expected[term].values[0]), rel=1e-12

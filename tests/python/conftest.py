@@ -12,8 +12,9 @@ from typing import Any
 
 import pytest
 import typer
-from mesoslip import Config, MesoslipError, _core
+from mesoslip import Config, ConfigError, MesoslipError, _core
 from mesoslip.command_line.main import main
+from mesoslip.errors import Problem
 
 ROOT = Path(__file__).parents[2]
 
@@ -109,6 +110,14 @@ def klein():
         return Config.from_dict(klein_tables(**changes))
 
     return configure
+
+
+def problem_of(tables: dict[str, Any]) -> Problem:
+    """The only mistake of tables that are refused."""
+    with pytest.raises(ConfigError) as caught:
+        Config.from_dict(tables)
+    (problem,) = caught.value.problems
+    return problem
 
 
 def at_end(one: Any, advances: int | None = None) -> Any:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mesoslip import _core
 from mesoslip.configuration.drive import DrivePart
 from mesoslip.configuration.kernel_parameters import Parameters, named
 from mesoslip.simulation.kernel import Kernel
@@ -52,9 +53,13 @@ class KernelSetup:
         ends = np.minimum(np.cumsum(durations), NEVER)
         if end_time is not None:
             ends[-1] = min(end_time, NEVER)
-        self._drive = ends, start_velocities, end_velocities, stages
-        self._forces = None if forces is None else np.array(forces)
-        self._stop: dict[str, Any] = {
+        drive = {
+            "part_end": ends,
+            "start_rate": start_velocities,
+            "end_rate": end_velocities,
+            "stage": stages,
+        }
+        ends_early = {
             "slips": stop.slips + earlier_slips if stop.slips else 0,
             "displacement": stop.displacement or 0.0,
             "block_distance": config.steady_block,
@@ -63,7 +68,7 @@ class KernelSetup:
             if stop.steady
             else 0.0,
         }
-        self._recorder: dict[str, Any] = {
+        recorder = {
             "interval": interval or config.output_interval,
             "slip_interval": config.slip_interval or 0.0,
             "slip_velocity": slider.slip_velocity(config),
@@ -72,12 +77,20 @@ class KernelSetup:
             "layers": slider.layers_recorded(config),
             "blocks": slider.block_count,
         }
-        self._avalanches: dict[str, Any] = {
+        avalanches = {
             "min_size": float(output.avalanche_size or 1) * config.has_avalanches,
             "snapshot_size": float(output.snapshot_size or 0),
             "max_avalanches": config.run.avalanches or 0,
-            "snapshot_times": (start_time or 0.0) + np.array(output.snapshots, dtype=float),
+            "snapshot_time": (start_time or 0.0) + np.array(output.snapshots, dtype=float),
         }
+        self._settings: list[tuple[Any, dict[str, Any]]] = [(_core.set_drive, drive)]
+        if forces is not None:
+            self._settings += [(_core.set_drive_values, {"start_value": np.array(forces)})]
+        self._settings += [
+            (_core.set_stop, ends_early),
+            (_core.set_recorder, recorder),
+            (_core.set_avalanches, avalanches),
+        ]
 
     def open(self, number: int = 0) -> Kernel:
         """A kernel of a realization that can be started or restored."""
@@ -87,12 +100,8 @@ class KernelSetup:
         else:
             kernel.set_contacts(self._contacts, self._parameters, self._seed, number)
         kernel.set_slider(*self._slider)
-        kernel.set_drive(*self._drive)
-        if self._forces is not None:
-            kernel.set_drive_values(self._forces)
-        kernel.set_stop(**self._stop)
-        kernel.set_recorder(**self._recorder)
-        kernel.set_avalanches(**self._avalanches)
+        for procedure, values in self._settings:
+            kernel.set(procedure, **values)
         return kernel
 
 

@@ -5,6 +5,7 @@ import functools
 import gc
 import os
 import signal
+import subprocess
 import sys
 from collections.abc import Generator
 from pathlib import Path
@@ -157,6 +158,20 @@ def quick_pictures(monkeypatch):
     monkeypatch.setattr(
         Figure, "savefig", lambda *given, **more: save(*given, **more | {"dpi": 30})
     )
+
+
+def run_program(*words: object, **options: Any) -> tuple[int, str, str]:
+    """Exit status, standard output and errors of a program in a process of its own."""
+    line = list(map(str, words))
+    done = subprocess.run(line, capture_output=True, text=True, check=False, **options)
+    return done.returncode, done.stdout, done.stderr
+
+
+def python(code: str, *words: object, **options: Any) -> str:
+    """Standard output of lines of Python in a process of its own, which succeed."""
+    status, printed, errors = run_program(sys.executable, "-c", code, *words, **options)
+    assert status == 0, errors
+    return printed
 
 
 class Command:

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 import tomli_w
 from apart import result_of
-from conftest import ROOT, klein_tables, long
+from conftest import ROOT, klein_tables, long, python
 from mesoslip.output import targets
 
 OLD = ROOT / "tests" / "reference" / "old.nc"
@@ -32,11 +32,9 @@ def short(tmp_path):
 def test_functions_are_seen():
     """By dir, completion and help, though they are imported late; docstrings name what exists."""
     code = "import mesoslip, sys; assert 'numpy' not in sys.modules; print(dir(mesoslip))"
-    printed = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, check=True, text=True
-    )
+    printed = python(code)
     for name in ("run", "slips", "avalanche_summary", "Config", "plot"):
-        assert f"'{name}'" in printed.stdout
+        assert f"'{name}'" in printed
         assert name in dir(mesoslip)
     assert "Simulate a configuration." in pydoc.render_doc(mesoslip.run)
     package = Path(mesoslip.__file__).parent

@@ -7,7 +7,6 @@ import math
 import os
 import re
 import signal
-import subprocess
 import sys
 
 import mesoslip
@@ -16,7 +15,7 @@ import numpy as np
 import pytest
 import tomli_w
 import xarray as xr
-from conftest import ROOT, klein_tables, long
+from conftest import ROOT, klein_tables, long, python, run_program
 from mesoslip.analysis.regime import outputs
 from mesoslip.command_line.main import COMMANDS, GROUPS, app
 from mesoslip.command_line.progress import say
@@ -297,12 +296,11 @@ def test_all_that_takes_a_while_reports_its_progress(tmp_path, command, monkeypa
 
 def test_start_up_is_quick():
     """No package that takes long is imported before it is needed."""
-    code = (
+    python(
         "import sys, mesoslip.command_line.main, mesoslip.theory.derived\n"
         "slow = {'matplotlib', 'scipy', 'xarray', 'netCDF4', 'pint', 'rich'} & sys.modules.keys()\n"
         "assert not slow, slow"
     )
-    subprocess.run([sys.executable, "-c", code], check=True)
 
 
 def test_commands_import_what_they_need(short, tmp_path, command):
@@ -348,8 +346,7 @@ for arguments in {commands}:
 import dask.array, pint
 json.dump(found, stdout)
 """
-    done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
-    assert json.loads(done.stdout) == [
+    assert json.loads(python(code)) == [
         [],
         [],
         ["netCDF4"],
@@ -599,10 +596,8 @@ def test_messages_do_not_steer_the_terminal(capsys):
 def test_a_matplotlibrc_of_the_current_folder_is_not_read(module, content, tmp_path):
     (tmp_path / "matplotlibrc").write_bytes(content)
     code = f"import mesoslip.{module}, matplotlib; assert not matplotlib.rcParams['text.usetex']"
-    done = subprocess.run(
-        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
-    )
-    assert (done.returncode, done.stderr) == (0, "")
+    done = run_program(sys.executable, "-c", code, cwd=tmp_path)
+    assert done == (0, "", "")
 
 
 @pytest.mark.parametrize("module", ["lazy_loader", "mesoslip.command_line.main", "typer"])
@@ -618,15 +613,13 @@ sys.meta_path.insert(0, Interrupt())
 sys.argv = ["/usr/bin/mesoslip", "--version"]
 runpy.run_module("mesoslip", run_name="__main__")
 """
-    done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True)
-    assert (done.returncode, done.stdout, done.stderr) == (130, b"", b"")
+    assert run_program(sys.executable, "-c", code) == (130, "", "")
 
 
 def test_nothing_is_imported_before_interrupts_are_caught():
     code = "import sys; sys.argv = ['/usr/bin/mesoslip']; import mesoslip"
-    line = [sys.executable, "-I", "-X", "importtime", "-c", code]
-    done = subprocess.run(line, check=True, capture_output=True, text=True)
-    names = [one.rpartition("|")[2].strip() for one in done.stderr.splitlines()]
+    _, _, timed = run_program(sys.executable, "-I", "-X", "importtime", "-c", code)
+    names = [one.rpartition("|")[2].strip() for one in timed.splitlines()]
     assert names[names.index("site") + 1] == "mesoslip._start"
 
 

@@ -4,8 +4,6 @@ import contextlib
 import math
 import os
 import re
-import subprocess
-import sys
 import tomllib
 from datetime import date
 
@@ -14,7 +12,7 @@ import numpy as np
 import pint
 import pytest
 import tomli_w
-from conftest import ROOT, klein_tables
+from conftest import ROOT, klein_tables, python
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mesoslip import Config, ConfigError, FileError, MesoslipError, ThresholdLaw
@@ -415,15 +413,7 @@ def test_units_need_no_files(tmp_path):
         "import sys; from mesoslip.configuration.units import to_si; to_si('97 N/m', 'N/m', '');"
         "assert 'pint' not in sys.modules; print(to_si('1 minute', 's', ''))"
     )
-    answer = subprocess.run(
-        [sys.executable, "-c", code],
-        env=environment,
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert answer.stdout == "60.0\n"
+    assert python(code, env=environment, cwd=tmp_path) == "60.0\n"
 
 
 @given(st.text(max_size=12))

@@ -14,7 +14,7 @@ import mesoslip
 import numpy as np
 import pytest
 import xarray as xr
-from conftest import klein_tables, long
+from conftest import klein_tables, long, run_program
 from mesoslip import Config, ConfigError, FileError
 from mesoslip.campaign.sweep_plan import Plan
 from mesoslip.execution import local
@@ -397,19 +397,13 @@ def test_workers_take_no_module_from_the_current_folder(tmp_path):
     """Such as a json.py that somebody has left there."""
     for name in ("json", "numpy", "mesoslip", "multiprocessing", "threading"):
         (tmp_path / f"{name}.py").write_text(f"open('{tmp_path}/imported', 'w').close()\n")
-    program = Path(sys.executable).with_name("mesoslip")
     (tmp_path / "sweep.toml").write_text(
         Config.from_dict(TINY).to_toml()
         + '\n[sweep]\nmeasures = ["breaks"]\n[sweep.grid]\n"contacts.delay" = [1e-4]\n'
     )
-    done = subprocess.run(
-        [program, "sweep", "sweep.toml", "--pool", "processes", "--workers", "1", "--quiet"],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert (done.returncode, done.stderr) == (0, "")
+    line = ("sweep", "sweep.toml", "--pool", "processes", "--workers", "1", "--quiet")
+    status, _, errors = run_program(Path(sys.executable).with_name("mesoslip"), *line, cwd=tmp_path)
+    assert (status, errors) == (0, "")
     assert not (tmp_path / "imported").exists()
 
 

@@ -6,8 +6,6 @@ import gc
 import json
 import re
 import shlex
-import subprocess
-import sys
 import threading
 import time
 import tomllib
@@ -19,7 +17,7 @@ from urllib.parse import parse_qsl
 import mesoslip
 import numpy as np
 import pytest
-from conftest import ROOT, klein_tables, long
+from conftest import ROOT, klein_tables, long, python
 from jinja2 import Environment
 from kinds import DIFFERENT, KINDS, configuration
 from mesoslip import Config
@@ -137,10 +135,7 @@ def alone(test):
 
     @functools.wraps(test)
     def run_alone():
-        done = subprocess.run(
-            [sys.executable, "-c", code], capture_output=True, check=False, text=True
-        )
-        assert done.returncode == 0, done.stderr
+        python(code)
 
     return run_alone
 

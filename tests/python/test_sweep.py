@@ -4,7 +4,6 @@ import itertools
 import json
 import os
 import re
-import subprocess
 import sys
 import textwrap
 import tracemalloc
@@ -19,7 +18,7 @@ import netCDF4
 import numpy as np
 import pytest
 import xarray as xr
-from conftest import ROOT, klein_tables, long
+from conftest import ROOT, klein_tables, long, run_program
 from mesoslip import Config, ConfigError, FileError
 from mesoslip.analysis.fronts import FRONT_TYPES
 from mesoslip.analysis.regime import REGIME, regimes
@@ -893,14 +892,9 @@ def test_a_script_without_a_guard_may_sweep(tmp_path):
         "data = mesoslip.sweep(json.loads(sys.argv[1]), executor=mesoslip.Processes(1))\n"
         "print(int(data['status'].sum()))\n"
     )
-    result = subprocess.run(
-        [sys.executable, script, json.dumps(tables())],
-        capture_output=True,
-        text=True,
-        check=False,
-        env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
-    )
-    assert (result.stdout, result.stderr) == ("0\n", "")
+    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
+    done = run_program(sys.executable, script, json.dumps(tables()), env=environment)
+    assert done == (0, "0\n", "")
 
 
 class Mirrored:

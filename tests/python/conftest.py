@@ -196,6 +196,12 @@ class Command:
         assert status == 0, message
         return printed
 
+    def messages(self, *arguments: object) -> str:
+        """Standard error of a command that succeeds."""
+        status, _, message = self(*arguments)
+        assert status == 0, message
+        return message
+
     def refusal(self, *arguments: object) -> str:
         """Standard error of a command that refuses its arguments or files."""
         status, _, message = self(*arguments)

@@ -123,8 +123,7 @@ def test_no_table_or_page_takes_the_place_of_an_output(
     monkeypatch.chdir(tmp_path)
     for one in ("in.nc", "other", "other.nc"):
         Path(one).write_bytes(OLD.read_bytes())
-    status, _, printed = command(*arguments, name)
-    assert status == 2
+    printed = command.refusal(*arguments, name)
     assert "is an output of mesoslip" in printed or "is the name of an output" in printed
     assert {one.read_bytes() for one in tmp_path.iterdir()} == {OLD.read_bytes()}
 

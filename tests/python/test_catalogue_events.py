@@ -143,8 +143,7 @@ def test_command_and_messages(trace, command, tmp_path):
         ("--main-size", "inf", "main_size = inf: must be a finite number of at least 0"),
         ("--threshold", "3", "threshold = 3.0: is that of the channel, and these events are slips"),
     ):
-        status, _, err = command("events", path, "--of", "slips", option, value)
-        assert status == 2
+        err = command.refusal("events", path, "--of", "slips", option, value)
         assert words in err
     assert len((tmp_path / "a.csv").read_text().splitlines()) == 11
     with pytest.raises(ConfigError, match="must be one of slips, avalanches, channel"):

@@ -55,8 +55,7 @@ WIDE = ("--set", "contacts.threshold.relative_width=0.1")
 
 def test_run_writes_a_cf_file(short, tmp_path, command):
     output = tmp_path / "deep" / "short.nc"
-    status, _, printed = command("run", short, "-o", output, "--set", "run.realizations=2")
-    assert status == 0
+    printed = command.messages("run", short, "-o", output, "--set", "run.realizations=2")
     assert str(output) in printed
     assert [path.name for path in output.parent.iterdir()] == ["short.nc"]
     with xr.open_datatree(output) as tree:
@@ -231,8 +230,7 @@ def test_an_interrupt_after_the_output_is_written_is_answered_at_once(
 
     monkeypatch.setattr(outputs, "classify", classify_once)
     many = ("--set", "run.realizations=20", "--set", "run.duration=0.1 s")
-    status, _, err = command("run", short, "-o", output, *many)
-    assert status == 0
+    err = command.messages("run", short, "-o", output, *many)
     assert len(judged) == 1
     assert f"{output}: complete; 'mesoslip regime {output}' prints the regime\n" in err
     assert list(tmp_path.glob("run.*")) == [output]
@@ -444,8 +442,7 @@ def test_onset_writes_both_equations(short, tmp_path, command):
 
 def test_the_master_equation_runs_like_contacts(short, tmp_path, command):
     output = tmp_path / "me.nc"
-    status, _, printed = command("run", short, "-o", output, "--set", "run.engine=me")
-    assert status == 0
+    printed = command.messages("run", short, "-o", output, "--set", "run.engine=me")
     assert "1 slip; " in printed
     assert command("slips", output)[0] == 0
     assert command("plot", output)[0] == 0

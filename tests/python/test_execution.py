@@ -376,8 +376,7 @@ def test_checkpoints_of_stopped_runs_are_kept_until_one_is_complete(tmp_path, ru
             seeds.append(json.loads(str(file["header"]))["configuration"])
     found = [Config.from_toml(one).run.seed for one in seeds]
     assert found == [3, 1, 2]
-    status, _, message = command("run", run_file, "-o", output)
-    assert status == 0, message
+    command.messages("run", run_file, "-o", output)
     assert sorted(one.name for one in tmp_path.iterdir()) == ["out.nc", "run.toml"]
 
 

@@ -355,20 +355,16 @@ def test_the_dataset_is_cf(klein, tmp_path):
 def test_command_and_run_say_the_same(klein, tmp_path, command):
     config, output = tmp_path / "few.toml", tmp_path / "few.nc"
     config.write_text(klein(contacts__count=300).to_toml())
-    status, _, said = command("run", str(config), "-o", str(output))
-    assert status == 0
+    said = command.messages("run", str(config), "-o", str(output))
     printed = command.output("regime", str(output))
     assert f"{output}: {printed.splitlines()[-1]}" in said
-    status, printed, _ = command("regime", str(output), "--json")
-    rows = json.loads(printed)
+    rows = json.loads(command.output("regime", str(output), "--json"))
     assert [one["realization"] for one in rows] == [0]
     data = mesoslip.regime(output)
     assert rows[0]["cycles"] == int(data["cycles"][0])
-    status, _, said = command("run", str(config), "-o", str(output), "--set", "run.realizations=3")
-    assert status == 0
-    assert (
-        sum(int(part.split()[0]) for part in said.splitlines()[-1].split(": ")[1].split(", ")) == 3
-    )
+    said = command.messages("run", str(config), "-o", str(output), "--set", "run.realizations=3")
+    counts = said.splitlines()[-1].split(": ")[1].split(", ")
+    assert sum(int(one.split()[0]) for one in counts) == 3
     curve = tmp_path / "curve.nc"
     wide = ("--set", "contacts.threshold.relative_width=0.1")
     assert command("curve", str(config), "-o", str(curve), *wide)[0] == 0

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 import xarray as xr
 from event_coverage import sequence, sizes
-from mesoslip.analysis.events import b_value, emissions_of, omori
+from mesoslip.analysis.events.channel import emissions_of
+from mesoslip.analysis.events.laws import b_value, omori
 from mesoslip.errors import ConfigError, FileError
 
 

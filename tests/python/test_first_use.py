@@ -7,7 +7,7 @@ import mesoslip
 import numpy as np
 import pytest
 from conftest import long
-from mesoslip.analysis.regime import IRREGULAR, STICK_SLIP
+from mesoslip.analysis.regime.result import IRREGULAR, STICK_SLIP
 
 TEETH = 30
 

@@ -3,7 +3,7 @@
 import mesoslip
 import numpy as np
 import pytest
-from mesoslip.analysis.strokes import strokes_of
+from mesoslip.analysis.strokes.catalogue import strokes_of
 from mesoslip.measured.understanding import understand
 
 COUNT = 40

@@ -6,7 +6,8 @@ import math
 import mesoslip
 import numpy as np
 import pytest
-from mesoslip.analysis.plateaus import levels_of, plateaus_of
+from mesoslip.analysis.plateaus.catalogue import plateaus_of
+from mesoslip.analysis.plateaus.levels import levels_of
 from mesoslip.errors import ConfigError, FileError
 from scipy.signal import lfilter
 

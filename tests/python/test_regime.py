@@ -10,17 +10,10 @@ import mesoslip
 import numpy as np
 import pytest
 from conftest import ROOT
-from mesoslip.analysis.regime import (
-    IRREGULAR,
-    NAMES,
-    REGIME,
-    SMOOTH,
-    STICK_SLIP,
-    TRANSIENT,
-    Scales,
-    classify,
-)
 from mesoslip.analysis.regime.events import NO_SLIPS, Slips
+from mesoslip.analysis.regime.result import IRREGULAR, NAMES, REGIME, SMOOTH, STICK_SLIP, TRANSIENT
+from mesoslip.analysis.regime.rules import classify
+from mesoslip.analysis.regime.scales import Scales
 from scipy.stats import norm
 
 TIME = np.linspace(0.0, 1.0, 20001)

@@ -10,7 +10,7 @@ import pytest
 import xarray as xr
 from conftest import ROOT, klein_tables, long
 from kinds import DIFFERENT, KINDS, configuration
-from mesoslip.analysis.rate_and_state import fit_laws
+from mesoslip.analysis.rate_and_state.search import fit_laws
 from mesoslip.output.kinds import KINDS as OUTPUTS
 from mesoslip.plots.views.run import caption
 from mesoslip.quantities import column

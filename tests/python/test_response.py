@@ -13,8 +13,11 @@ import xarray as xr
 from conftest import ROOT, klein_tables
 from matplotlib.figure import Figure
 from mesoslip import Config, FileError
-from mesoslip.analysis.rate_and_state import Loading, fit_laws
-from mesoslip.analysis.response import force_scale, line, rows_of, scalars_of, tables
+from mesoslip.analysis.rate_and_state.points import Loading
+from mesoslip.analysis.rate_and_state.search import fit_laws
+from mesoslip.analysis.response.dataset import rows_of, scalars_of
+from mesoslip.analysis.response.line import line
+from mesoslip.analysis.response.tables import force_scale, tables
 from mesoslip.analysis.steady_force import steady_mean, transient
 from mesoslip.theory.steady_sliding import sliding_of
 from oracles import Friction, spring_slider

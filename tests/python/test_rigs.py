@@ -4,7 +4,7 @@ import mesoslip
 import numpy as np
 import pytest
 from conftest import ROOT
-from mesoslip.analysis.strokes import strokes_of
+from mesoslip.analysis.strokes.catalogue import strokes_of
 
 MEASURED = ROOT / "runs" / "measured"
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from conftest import ROOT, long
 from mesoslip import ConfigError, SteadySliding
-from mesoslip.analysis.regime import STICK_SLIP
+from mesoslip.analysis.regime.result import STICK_SLIP
 from mesoslip.quantities import with_unit
 from mesoslip.theory.force_curve import ForceCurve
 from mesoslip.theory.lives import newborn_stretch, scales

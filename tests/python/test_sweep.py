@@ -21,7 +21,8 @@ import xarray as xr
 from conftest import ROOT, klein_tables, long, run_program
 from mesoslip import Config, ConfigError, FileError
 from mesoslip.analysis.fronts import FRONT_TYPES
-from mesoslip.analysis.regime import REGIME, regimes
+from mesoslip.analysis.regime.outputs import regimes
+from mesoslip.analysis.regime.result import REGIME
 from mesoslip.campaign.measures import MEASURES
 from mesoslip.campaign.point import Outcome, combination_key, point_name
 from mesoslip.campaign.sweep import groups, run_sweep, stored_body, stored_measures, task_of

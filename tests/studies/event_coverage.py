@@ -8,7 +8,7 @@ import math
 import sys
 
 import numpy as np
-from mesoslip.analysis.events import b_value, omori
+from mesoslip.analysis.events.laws import b_value, omori
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]

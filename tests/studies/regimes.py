@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 import mesoslip
 import numpy as np
-from mesoslip.analysis.regime import NAMES
+from mesoslip.analysis.regime.result import NAMES
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]

@@ -11,7 +11,7 @@ import sys
 import mesoslip
 import numpy as np
 import xarray as xr
-from mesoslip.analysis.events import omori
+from mesoslip.analysis.events.laws import omori
 
 WHOLE = 1
 

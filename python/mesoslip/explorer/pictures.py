@@ -10,7 +10,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mesoslip.analysis.regime import IRREGULAR, STICK_SLIP, TRANSIENT, regimes, results_of
+from mesoslip.analysis.regime.outputs import regimes
+from mesoslip.analysis.regime.result import IRREGULAR, STICK_SLIP, TRANSIENT, results_of
 from mesoslip.analysis.slips import catalogue_of
 from mesoslip.array_types import Array, DataTree
 from mesoslip.configuration.config import Config

@@ -15,7 +15,8 @@ from mesoslip.analysis.regime.events import MIN_CYCLES, NO_SLIPS, Slips
 from mesoslip.analysis.regime.result import NAMES, REGIME, SMOOTH, TRANSIENT, RegimeResult
 from mesoslip.analysis.regime.rules import classify
 from mesoslip.analysis.regime.scales import Scales, Stage, measured_stage, stage_of
-from mesoslip.analysis.strokes import Piece, output_pieces, sliding_of
+from mesoslip.analysis.strokes.segments import Piece, output_pieces
+from mesoslip.analysis.strokes.sliding import sliding_of
 from mesoslip.array_types import Array, Dataset, DataTree
 from mesoslip.output.access import group_of, is_measured
 from mesoslip.output.arrays import Tree

@@ -457,7 +457,6 @@ def curve_alone(config: Config) -> Theory:
 
 
 def with_steady_sliding(config: Config, curve: Theory) -> Theory:
-    """The theory of a curve, with the stability of steady sliding."""
     sliding = steady_sliding(config, MAX_WORK)
     if sliding is None:
         return curve

@@ -60,7 +60,6 @@ class Origin:
     base: None = None
 
     def to_toml(self) -> str:
-        """The configuration."""
         return self.configuration
 
 

@@ -185,7 +185,6 @@ def _without_brackets(text: str) -> str:
 
 
 def _fits(unit: str, quantity: str) -> bool:
-    """Whether a unit is one of a quantity."""
     return _has_dimension(unit, QUANTITIES.get(quantity, "m"))
 
 

@@ -70,7 +70,6 @@ class Record:
 
     @property
     def force_name(self) -> str:
-        """Name of the force in outputs."""
         return "friction_coefficient" if self.is_friction else "spring_force"
 
 
@@ -192,7 +191,6 @@ def resolve(trace: TraceDescription, record: Record) -> TraceDescription:
 
 
 def _recorded(table: Table, columns: Assignment, index: int) -> RecordedColumn:
-    """A column as it is in the file."""
     header, position = table.headers[index], str(index + 1)
     use = next((name for name, one in columns.used.items() if one.index == index), "")
     unit = columns.used[use].unit if use else table.units[index]

@@ -101,7 +101,6 @@ def _columns(catalogue: Catalogue) -> dict[str, tuple[str, str]]:
 
 
 def _first_rows(catalogue: Catalogue) -> list[Block]:
-    """The first rows of a catalogue."""
     rows = catalogue.rows
     if not rows:
         return []

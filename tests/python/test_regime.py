@@ -1,15 +1,14 @@
 """The regime of motion: its rules, and runs of every kind."""
 
 import dataclasses
-import importlib.util
 import json
 import math
-import sys
 
+import marked_motions
 import mesoslip
 import numpy as np
 import pytest
-from conftest import ROOT
+import regimes
 from mesoslip.analysis.regime.events import NO_SLIPS, Slips
 from mesoslip.analysis.regime.result import IRREGULAR, NAMES, REGIME, SMOOTH, STICK_SLIP, TRANSIENT
 from mesoslip.analysis.regime.rules import classify
@@ -17,16 +16,6 @@ from mesoslip.analysis.regime.scales import Scales
 from scipy.stats import norm
 
 TIME = np.linspace(0.0, 1.0, 20001)
-
-
-def study(name="regimes"):
-    """The study with the spectral classification, or another one."""
-    path = ROOT / "tests" / "studies" / f"{name}.py"
-    spec = importlib.util.spec_from_file_location(f"{name}_study", path)
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module
 
 
 def sawtooth(periods, falls):
@@ -258,18 +247,16 @@ def test_the_irregular_motion_of_ageing_contacts(klein):
 
 def test_marked_motions():
     """Some of those of the study that an eye has marked, the cheapest of each kind."""
-    module = study("marked_motions")
-    motions = [one for one in module.load() if one["kind"] in {"layers", "lattice", "fast"}]
-    assert len(module.load()) == 140
-    for one in module.classified(motions[1::30]):
+    motions = [one for one in marked_motions.load() if one["kind"] in {"layers", "lattice", "fast"}]
+    assert len(marked_motions.load()) == 140
+    for one in marked_motions.classified(motions[1::30]):
         assert one.regime in one.marks, one.configuration
         assert one.regime in NAMES
 
 
 def test_spectra_say_the_same():
     """At 5 of the 360 points of the study, with other random numbers."""
-    module = study()
-    compared = list(module.compare(module.points()[151::42], first_seed=9000))
+    compared = list(regimes.compare(regimes.points()[151::42], first_seed=9000))
     disagreeing = [one.point for one in compared if one.regime not in one.spectral]
     assert not disagreeing
     assert {SMOOTH, STICK_SLIP} <= {one.regime for one in compared}

@@ -88,19 +88,24 @@ KLEIN = {
 }
 
 
-def klein_tables(**changes: Any) -> dict[str, Any]:
-    """Klein's case as tables, with changes; a double underscore separates tables from keys."""
-    tables = copy.deepcopy(KLEIN)
+def changed(tables: dict[str, Any], **changes: Any) -> dict[str, Any]:
+    """Tables with changes; a double underscore separates tables from keys, None removes a key."""
+    tables = copy.deepcopy(tables)
     for path, value in changes.items():
         *outer, key = path.split("__")
         table = tables
         for name in outer:
             table = table.setdefault(name, {})
         if value is None:
-            del table[key]
+            table.pop(key, None)
         else:
             table[key] = copy.deepcopy(value)
     return tables
+
+
+def klein_tables(**changes: Any) -> dict[str, Any]:
+    """Klein's case as tables, with changes."""
+    return changed(KLEIN, **changes)
 
 
 @pytest.fixture

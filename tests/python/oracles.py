@@ -462,6 +462,14 @@ def exact_events(config: Config, scan: float) -> Contacts:
     return contacts
 
 
+def assert_same_events(actual, expected, first: int | None = None, rtol: float = 1e-9) -> None:
+    """The same contacts at the same times, of the first events if a number is given."""
+    actual, expected = actual[:first], expected[:first]
+    assert [contacts for _, contacts in actual] == [contacts for _, contacts in expected]
+    times = ([time for time, _ in one] for one in (actual, expected))
+    np.testing.assert_allclose(*times, rtol=rtol)
+
+
 def ageing_force(config: Config, velocity: float) -> float:
     """Steady contact force at a velocity of contacts that age, without delay [N].
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from conftest import long
 from mesoslip.simulation.realization import Realization
-from oracles import exact_events, fixed_step
+from oracles import assert_same_events, exact_events, fixed_step
 
 # Fast loading, so that a slip comes within some ten milliseconds.
 FAST = {
@@ -57,10 +57,7 @@ def test_events_are_those_of_matrix_exponentials(klein, changes):
     assert len(expected) >= (1 if not config.contacts.reattach else 5)
     # What follows many breaks is sensitive to rounding; the first dozens must agree.
     first = min(len(expected), 40)
-    assert [contact for _, contact in actual[:first]] == [one for _, one in expected[:first]]
-    np.testing.assert_allclose(
-        [time for time, _ in actual[:first]], [time for time, _ in expected[:first]], rtol=1e-9
-    )
+    assert_same_events(actual, expected, first)
 
 
 @pytest.mark.parametrize("coupling", ["scaled", long("equal")])

@@ -8,7 +8,7 @@ from conftest import at_end, long
 from mesoslip import Config
 from mesoslip.simulation.realization import Realization
 from mesoslip.simulation.recorded_tables import AVALANCHE_COLUMNS
-from oracles import exact_events, quasistatic
+from oracles import assert_same_events, exact_events, quasistatic
 from states import reals, saved, taken_up
 
 # Few contacts under a fast drive; the area makes the bonds a few times as stiff as the contacts.
@@ -79,10 +79,7 @@ def test_events_are_those_of_forces_recomputed_at_every_event(klein, kind, size,
         renewals = now
     # What follows many breaks is sensitive to rounding; the first dozens must agree.
     first = min(len(expected), 25)
-    assert [contacts for _, contacts in actual[:first]] == [one for _, one in expected[:first]]
-    np.testing.assert_allclose(
-        [time for time, _ in actual[:first]], [time for time, _ in expected[:first]], rtol=1e-9
-    )
+    assert_same_events(actual, expected, first)
     np.testing.assert_array_equal(
         column(realization, "size")[:first], [len(contacts) for _, contacts in expected[:first]]
     )

@@ -6,12 +6,12 @@ from typing import Any
 import mesoslip
 import numpy as np
 import pytest
-from conftest import at_end, long
+from conftest import at_end, changed, long
 from kinds import configuration
 from mesoslip import Config, ConfigError
 from mesoslip.simulation.realization import Realization
 from mesoslip.theory.contacts import contact_theory
-from oracles import aged, fixed_step, frozen_law, uniforms
+from oracles import aged, assert_same_events, fixed_step, frozen_law, uniforms
 from scipy import integrate, special
 from test_events import breaks
 
@@ -32,16 +32,7 @@ def unit_tables(count: int = 1000, **changes: Any) -> dict[str, Any]:
         },
         "output": {"interval": 1.0},
     }
-    for path, value in changes.items():
-        *outer, key = path.split("__")
-        table = tables
-        for name in outer:
-            table = table.setdefault(name, {})
-        if value is None:
-            table.pop(key, None)
-        else:
-            table[key] = value
-    return tables
+    return changed(tables, **changes)
 
 
 def unit(count: int = 1000, **changes: Any) -> Config:
@@ -149,10 +140,7 @@ def test_breaks_come_where_their_deviates_say(ratio, direction):
     expected = sorted(one for one in expected if one[0] < 400)
     actual = breaks(config)
     assert len(expected) == len(actual) > 320
-    assert [contact for _, contact in actual] == [contact for _, contact in expected]
-    np.testing.assert_allclose(
-        [time for time, _ in actual], [time for time, _ in expected], rtol=1e-12
-    )
+    assert_same_events(actual, expected, rtol=1e-12)
 
 
 @pytest.mark.parametrize("ratio", [2e-3, 0.05, 1.0])
@@ -181,10 +169,7 @@ def test_uniform_motion_breaks_contacts_where_clocks_do(ratio, changes):
         )
     uniform, clocked = runs
     assert len(uniform) == len(clocked) > 500
-    assert [contact for _, contact in uniform] == [contact for _, contact in clocked]
-    np.testing.assert_allclose(
-        [time for time, _ in uniform], [time for time, _ in clocked], rtol=1e-10
-    )
+    assert_same_events(uniform, clocked, rtol=1e-10)
 
 
 def relaxing(force_ratio: float, width: float) -> dict[str, Any]:
@@ -222,10 +207,7 @@ def test_uniform_motion_breaks_ageing_contacts_where_clocks_do(ageing, ratio, de
         for end in (0.3, 0.3 * (1.0 + 1e-13))
     )
     assert len(uniform) == len(clocked) > 60
-    assert [contact for _, contact in uniform] == [contact for _, contact in clocked]
-    np.testing.assert_allclose(
-        [time for time, _ in uniform], [time for time, _ in clocked], rtol=1e-9
-    )
+    assert_same_events(uniform, clocked)
 
 
 @pytest.mark.parametrize(
@@ -431,11 +413,7 @@ def test_without_temperature_it_is_the_model_without(kind, rate, force_ratio):
     warm = Config.from_dict(tables | {"contacts": tables["contacts"] | thermal})
     expected, actual = breaks(cold), breaks(warm)
     assert len(expected) == len(actual)
-    first = 300
-    assert [one for _, one in actual[:first]] == [one for _, one in expected[:first]]
-    np.testing.assert_allclose(
-        [time for time, _ in actual[:first]], [time for time, _ in expected[:first]], rtol=1e-9
-    )
+    assert_same_events(actual, expected, 300)
 
 
 @pytest.mark.parametrize("seed", [2, 44, 61])

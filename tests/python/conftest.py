@@ -108,6 +108,11 @@ def klein_tables(**changes: Any) -> dict[str, Any]:
     return changed(KLEIN, **changes)
 
 
+def drive_in_stages(*stages: tuple[float, float]) -> dict[str, Any]:
+    """The table of a drive in stages, each of a duration and a velocity."""
+    return {"stage": [{"duration": time, "velocity": velocity} for time, velocity in stages]}
+
+
 @pytest.fixture
 def klein():
     """Klein's case as a configuration, with changes."""

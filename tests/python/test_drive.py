@@ -7,7 +7,7 @@ import mesoslip
 import numpy as np
 import pytest
 import tomli_w
-from conftest import at_end, klein_tables, long, problem_of
+from conftest import at_end, drive_in_stages, klein_tables, long, problem_of
 from kinds import KINDS, RAMPS, configuration, pairwise
 from mesoslip import Config, ConfigError
 from mesoslip.simulation.realization import Realization
@@ -484,11 +484,7 @@ BACKWARDS = {
         "drive": {"cycle": {"amplitude": 2e-7, "frequency": 50.0, "cycles": 3}},
         "run__duration": None,
     },
-    "after a jerk": {
-        "drive": {
-            "stage": [{"duration": 1e-3, "velocity": 1e-5}, {"duration": 0.05, "velocity": -1e-4}]
-        }
-    },
+    "after a jerk": {"drive": drive_in_stages((1e-3, 1e-5), (0.05, -1e-4))},
 }
 
 

@@ -3,7 +3,7 @@
 import mesoslip
 import numpy as np
 import pytest
-from conftest import long
+from conftest import drive_in_stages, long
 from mesoslip.simulation.realization import Realization
 from oracles import assert_same_events, exact_events, fixed_step
 
@@ -93,7 +93,7 @@ def test_prescribed_with_reversals_and_holds(klein):
     stages = [(0.02, 1e-6), (0.005, 0.0), (0.05, -1e-6), (0.03, 1e-6)]
     config = klein(
         run__duration=None,
-        drive={"stage": [{"duration": time, "velocity": velocity} for time, velocity in stages]},
+        drive=drive_in_stages(*stages),
         slider={"kind": "prescribed"},
         contacts__count=20,
         contacts__threshold__relative_width=0.2,

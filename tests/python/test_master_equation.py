@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from conftest import at_end, long
+from conftest import at_end, drive_in_stages, long
 from mesoslip.errors import ConfigError
 from mesoslip.simulation import realization
 from mesoslip.simulation.audit import failed_checks, step_errors
@@ -12,17 +12,9 @@ from oracles import frozen_law, stationary_force
 from states import entries, reals, saved
 
 FORCE = 18e-6
-REVERSALS = [
-    {"duration": duration, "velocity": velocity}
-    for duration, velocity in (
-        (0.12, 1e-7),
-        (0.05, -1e-7),
-        (0.02, 0.0),
-        (0.1, 2e-7),
-        (0.2, -1.5e-7),
-        (0.1, 1e-7),
-    )
-]
+REVERSALS = drive_in_stages(
+    (0.12, 1e-7), (0.05, -1e-7), (0.02, 0.0), (0.1, 2e-7), (0.2, -1.5e-7), (0.1, 1e-7)
+)
 PRESCRIBED = {"slider": {"kind": "prescribed"}}
 LAYERS = {"mass": 1.47e-3, "stiffness": 97.0, "kind": "layered", "layers": 4}
 
@@ -45,9 +37,7 @@ def off_the_curve(config):
 
 
 def back_and_forth(klein, **changes):
-    return klein(
-        run__duration=None, drive={"stage": REVERSALS}, **PRESCRIBED, **dispersion(0.1), **changes
-    )
+    return klein(run__duration=None, drive=REVERSALS, **PRESCRIBED, **dispersion(0.1), **changes)
 
 
 @pytest.mark.parametrize(
@@ -453,7 +443,7 @@ def test_detached_contacts_attach_while_the_slider_rests(klein):
     stages = [(0.07, 2.4e-6), (0.05, 0.0), (0.1, -4e-7)]
     changes = {
         "run__duration": None,
-        "drive": {"stage": [{"duration": time, "velocity": speed} for time, speed in stages]},
+        "drive": drive_in_stages(*stages),
         "contacts__delay": 5e-3,
         "contacts__coupling": "equal",
         "contacts__back_force_ratio": 0.3,
@@ -506,7 +496,7 @@ def test_turning_points_do_not_stall(klein, law, width, delay, coupling, initial
         klein(
             run__engine="me",
             run__duration=None,
-            drive={"stage": [{"duration": time, "velocity": speed} for time, speed in stages]},
+            drive=drive_in_stages(*stages),
             contacts__delay=delay,
             contacts__coupling=coupling,
             contacts__back_force_ratio=0.3,

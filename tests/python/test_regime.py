@@ -9,6 +9,7 @@ import mesoslip
 import numpy as np
 import pytest
 import regimes
+from conftest import drive_in_stages
 from mesoslip.analysis.regime.events import NO_SLIPS, Slips
 from mesoslip.analysis.regime.result import IRREGULAR, NAMES, REGIME, SMOOTH, STICK_SLIP, TRANSIENT
 from mesoslip.analysis.regime.rules import classify
@@ -302,18 +303,14 @@ def test_a_slider_without_inertia(klein):
 
 
 def test_the_last_stage_of_a_drive_that_turns_back_is_evaluated(klein):
-    forth = {"duration": 4.0, "velocity": 1e-6}
-    back = {"duration": 4.0, "velocity": -1e-6}
-    rest = {"duration": 1.0, "velocity": 0.0}
+    drive = drive_in_stages((4.0, 1e-6), (4.0, -1e-6), (1.0, 0.0))
     few = {"contacts__count": 500, "contacts__delay": 3e-3, "run__duration": 9.0}
-    found = mesoslip.regime(mesoslip.run(klein(**few, drive={"stage": [forth, back, rest]}))).isel(
-        realization=0
-    )
+    found = mesoslip.regime(mesoslip.run(klein(**few, drive=drive))).isel(realization=0)
     assert found["regime"] == STICK_SLIP
     assert found["window_start"] == pytest.approx(6.0)
     assert found["window_end"] == pytest.approx(8.0)
     alone = mesoslip.regime(
-        mesoslip.run(klein(**few | {"run__duration": 4.0}, drive={"stage": [back]}))
+        mesoslip.run(klein(**few | {"run__duration": 4.0}, drive=drive_in_stages((4.0, -1e-6))))
     ).isel(realization=0)
     assert float(found["period"]) == pytest.approx(float(alone["period"]), rel=0.1)
     assert float(found["stick_share"]) == pytest.approx(float(alone["stick_share"]), abs=0.1)

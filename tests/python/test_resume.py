@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 import tomli_w
 import xarray as xr
-from conftest import at_end, klein_tables, long
+from conftest import at_end, drive_in_stages, klein_tables, long
 from invariants import differences
 from kinds import COARSE, KINDS, RANDOM, THERMAL, configuration, pairwise
 from mesoslip import Config, FileError, RunError
@@ -34,15 +34,7 @@ ONCE = {}
 
 
 # For master equations, whose runs take most of the time: one slip and a reversal.
-SHORT = {
-    "drive": {
-        "stage": [
-            {"duration": 0.025, "velocity": 1e-5},
-            {"duration": 0.002, "velocity": 0.0},
-            {"duration": 0.025, "velocity": -1e-5},
-        ]
-    }
-}
+SHORT = {"drive": drive_in_stages((0.025, 1e-5), (0.002, 0.0), (0.025, -1e-5))}
 
 
 def short_configuration(kind: str) -> Config:

@@ -3,7 +3,7 @@
 import mesoslip
 import numpy as np
 import pytest
-from conftest import klein_tables, long, problem_of
+from conftest import drive_in_stages, klein_tables, long, problem_of
 from mesoslip import Config, ConfigError
 from mesoslip.configuration.threshold_laws.table import stretch_cells
 from mesoslip.theory.contacts.plain_sliding import SteadySliding
@@ -24,13 +24,7 @@ FORWARD = {"run__drive_displacement": 5e-8}
 # Far enough back that contacts break there, and forward again.
 BACK_AND_FORTH = {
     "run__duration": 0.013,
-    "drive": {
-        "stage": [
-            {"duration": 0.005, "velocity": 4e-6},
-            {"duration": 0.004, "velocity": -6e-6},
-            {"duration": 0.004, "velocity": 5e-6},
-        ]
-    },
+    "drive": drive_in_stages((0.005, 4e-6), (0.004, -6e-6), (0.004, 5e-6)),
 }
 RANDOM = np.random.default_rng(3)
 THRESHOLDS = RANDOM.uniform(0.5, 1.5, 200)

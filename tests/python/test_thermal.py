@@ -6,7 +6,7 @@ from typing import Any
 import mesoslip
 import numpy as np
 import pytest
-from conftest import at_end, changed, long
+from conftest import at_end, changed, drive_in_stages, long
 from kinds import configuration
 from mesoslip import Config, ConfigError
 from mesoslip.simulation.realization import Realization
@@ -333,7 +333,7 @@ def test_a_hold_of_a_million_seconds():
     config = unit(
         count,
         run__duration=None,
-        drive={"stage": [{"duration": 1e3, "velocity": 1e-2}, {"duration": 1e6, "velocity": 0.0}]},
+        drive=drive_in_stages((1e3, 1e-2), (1e6, 0.0)),
         contacts__threshold__relative_width=0.3,
         output__interval=100.0,
     )
@@ -351,7 +351,7 @@ def test_a_long_hold_of_a_rigid_slider(klein):
     """A slider that settles between two breaks goes from one to the next in one step."""
     config = klein(
         run__duration=None,
-        drive={"stage": [{"duration": 2.0, "velocity": 1e-7}, {"duration": 1e6, "velocity": 0.0}]},
+        drive=drive_in_stages((2.0, 1e-7), (1e6, 0.0)),
         contacts__count=20,
         contacts__coupling="equal",
         contacts__threshold__relative_width=0.1,
@@ -370,13 +370,7 @@ def test_a_rigid_slider_moves_on_after_a_long_hold(klein):
     """It starts in balance but for rounding, which the drive outweighs before the time can grow."""
     config = klein(
         run__duration=None,
-        drive={
-            "stage": [
-                {"duration": 0.2, "velocity": -1e-6},
-                {"duration": 1e6, "velocity": 0.0},
-                {"duration": 0.2, "velocity": 1e-6},
-            ]
-        },
+        drive=drive_in_stages((0.2, -1e-6), (1e6, 0.0), (0.2, 1e-6)),
         contacts__count=500,
         contacts__coupling="equal",
         contacts__delay_law="exponential",
@@ -450,13 +444,7 @@ def test_contacts_reach_their_thresholds_after_a_reversal(seed):
         long({"run__duration": 0.02, "drive__velocity": 1e-5}),
         {
             "run__duration": None,
-            "drive": {
-                "stage": [
-                    {"duration": 0.025, "velocity": 1e-5},
-                    {"duration": 0.005, "velocity": 0.0},
-                    {"duration": 0.04, "velocity": -1e-5},
-                ]
-            },
+            "drive": drive_in_stages((0.025, 1e-5), (0.005, 0.0), (0.04, -1e-5)),
             "contacts__back_force_ratio": 0.0,
         },
     ],

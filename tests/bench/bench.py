@@ -4,8 +4,6 @@ Run by ``make bench``; at the end each number that has a goal stands beside it. 
 to be compared with each other, not with other machines.
 """
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

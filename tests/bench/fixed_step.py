@@ -1,7 +1,5 @@
 """What a user would write: the same model at a fixed time step, in NumPy and in Numba."""
 
-from __future__ import annotations
-
 import math
 import time
 

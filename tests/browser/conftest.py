@@ -1,7 +1,5 @@
 """A real browser, and the page of the explorer in it."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

@@ -1,7 +1,5 @@
 """The page of the explorer in a real browser: as it is loaded, used, and closed."""
 
-from __future__ import annotations
-
 import http.client
 import json
 import os

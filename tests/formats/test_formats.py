@@ -1,7 +1,5 @@
 """Outputs in the hands of other programs: a checker of CF, ArviZ, Zarr, ObsPy."""
 
-from __future__ import annotations
-
 import io
 import json
 import subprocess

@@ -1,7 +1,5 @@
 """Functions in processes of their own, which may crash or hang, and commands within them."""
 
-from __future__ import annotations
-
 import os
 import pickle
 import resource

@@ -3,8 +3,6 @@
 A name such as "configurations:1:17" is all that a case depends on.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import math

@@ -4,8 +4,6 @@ Scales are drawn over decades, each by its ratio to another, so that most runs h
 and ringing, and most are over in a tenth of a second.
 """
 
-from __future__ import annotations
-
 import math
 from random import Random
 from typing import Any

@@ -5,8 +5,6 @@ found is kept in out/fuzz: the configuration of the case, the smallest one that 
 same, and what did not hold.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import re

@@ -1,7 +1,5 @@
 """What holds of every output, whatever was run."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 

@@ -3,8 +3,6 @@
 What holds in each: files that the program did not make are as they were.
 """
 
-from __future__ import annotations
-
 import inspect
 import json
 import os

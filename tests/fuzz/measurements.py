@@ -1,7 +1,5 @@
 """Files of measurements in the styles of laboratories, with what they say; and damaged ones."""
 
-from __future__ import annotations
-
 import bz2
 import gzip
 import lzma

@@ -1,7 +1,5 @@
 """Attacks on what programs share: memory, a disk, a store of finished points."""
 
-from __future__ import annotations
-
 import os
 import resource
 import signal

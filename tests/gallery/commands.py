@@ -3,8 +3,6 @@
 They are small: the pictures matter here, not the physics.
 """
 
-from __future__ import annotations
-
 Arguments = tuple[str, ...]
 
 

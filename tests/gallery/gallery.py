@@ -6,8 +6,6 @@ Pictures whose names have a PART in them are drawn; all by default. Outputs are 
 ``index.html``; the same pictures stand on sheets, ``sheet-1.png`` and so on.
 """
 
-from __future__ import annotations
-
 import argparse
 import html
 import shlex

@@ -1,7 +1,5 @@
 """Pictures of the gallery: the outputs that each shows, and options of ``mesoslip plot``."""
 
-from __future__ import annotations
-
 
 def _view(name: str, *options: str) -> tuple[str, ...]:
     return "--view", name, *options

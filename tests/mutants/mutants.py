@@ -5,8 +5,6 @@ names the tests that should fail then: of pytest, or a program of tests/fortran.
 themselves are not touched: mutants are made of copies in build/mutants.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import shutil

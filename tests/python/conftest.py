@@ -1,12 +1,11 @@
 """What the tests share."""
 
-from __future__ import annotations
-
 import copy
 import functools
 import gc
 import os
 import signal
+import subprocess
 import sys
 from collections.abc import Generator
 from pathlib import Path
@@ -14,8 +13,9 @@ from typing import Any
 
 import pytest
 import typer
-from mesoslip import Config, MesoslipError, _core
+from mesoslip import Config, ConfigError, MesoslipError, _core
 from mesoslip.command_line.main import main
+from mesoslip.errors import Problem
 
 ROOT = Path(__file__).parents[2]
 
@@ -88,19 +88,29 @@ KLEIN = {
 }
 
 
-def klein_tables(**changes: Any) -> dict[str, Any]:
-    """Klein's case as tables, with changes; a double underscore separates tables from keys."""
-    tables = copy.deepcopy(KLEIN)
+def changed(tables: dict[str, Any], **changes: Any) -> dict[str, Any]:
+    """Tables with changes; a double underscore separates tables from keys, None removes a key."""
+    tables = copy.deepcopy(tables)
     for path, value in changes.items():
         *outer, key = path.split("__")
         table = tables
         for name in outer:
             table = table.setdefault(name, {})
         if value is None:
-            del table[key]
+            table.pop(key, None)
         else:
             table[key] = copy.deepcopy(value)
     return tables
+
+
+def klein_tables(**changes: Any) -> dict[str, Any]:
+    """Klein's case as tables, with changes."""
+    return changed(KLEIN, **changes)
+
+
+def drive_in_stages(*stages: tuple[float, float]) -> dict[str, Any]:
+    """The table of a drive in stages, each of a duration and a velocity."""
+    return {"stage": [{"duration": time, "velocity": velocity} for time, velocity in stages]}
 
 
 @pytest.fixture
@@ -111,6 +121,14 @@ def klein():
         return Config.from_dict(klein_tables(**changes))
 
     return configure
+
+
+def problem_of(tables: dict[str, Any]) -> Problem:
+    """The only mistake of tables that are refused."""
+    with pytest.raises(ConfigError) as caught:
+        Config.from_dict(tables)
+    (problem,) = caught.value.problems
+    return problem
 
 
 def at_end(one: Any, advances: int | None = None) -> Any:
@@ -152,6 +170,20 @@ def quick_pictures(monkeypatch):
     )
 
 
+def run_program(*words: object, **options: Any) -> tuple[int, str, str]:
+    """Exit status, standard output and errors of a program in a process of its own."""
+    line = list(map(str, words))
+    done = subprocess.run(line, capture_output=True, text=True, check=False, **options)
+    return done.returncode, done.stdout, done.stderr
+
+
+def python(code: str, *words: object, **options: Any) -> str:
+    """Standard output of lines of Python in a process of its own, which succeed."""
+    status, printed, errors = run_program(sys.executable, "-c", code, *words, **options)
+    assert status == 0, errors
+    return printed
+
+
 class Command:
     """Runs a command of the program in this process."""
 
@@ -173,6 +205,12 @@ class Command:
         status, printed, message = self(*arguments)
         assert status == 0, message
         return printed
+
+    def messages(self, *arguments: object) -> str:
+        """Standard error of a command that succeeds."""
+        status, _, message = self(*arguments)
+        assert status == 0, message
+        return message
 
     def refusal(self, *arguments: object) -> str:
         """Standard error of a command that refuses its arguments or files."""

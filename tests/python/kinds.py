@@ -1,24 +1,16 @@
 """Short runs of every kind, for what must hold of all of them: some ten thousand events each."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from itertools import combinations
 from typing import Any
 
-from conftest import klein_tables, long
+from conftest import drive_in_stages, klein_tables, long
 from mesoslip import Config
 
 # Fast loading of few contacts, so that slips and reversals come within some ten milliseconds.
 FAST = {
     "run__duration": None,
-    "drive": {
-        "stage": [
-            {"duration": 0.04, "velocity": 1e-5},
-            {"duration": 0.01, "velocity": 0.0},
-            {"duration": 0.05, "velocity": -1e-5},
-        ]
-    },
+    "drive": drive_in_stages((0.04, 1e-5), (0.01, 0.0), (0.05, -1e-5)),
     "contacts__count": 48,
     "contacts__threshold__relative_width": 0.1,
     "output__interval": 1e-3,

@@ -3,8 +3,6 @@
 What differs from the old ones is reported; why is then to be said in the commit that changes them.
 """
 
-from __future__ import annotations
-
 import mesoslip
 from mesoslip.output import writing
 from reference import CASES, FOLDER, report

@@ -3,8 +3,6 @@
 None of them shares code with the kernels, but for Philox, which is checked by known answers.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 
@@ -462,6 +460,14 @@ def exact_events(config: Config, scan: float) -> Contacts:
         time = end
         contacts.act(state[0], state[1], time, slack=1e-19)
     return contacts
+
+
+def assert_same_events(actual, expected, first: int | None = None, rtol: float = 1e-9) -> None:
+    """The same contacts at the same times, of the first events if a number is given."""
+    actual, expected = actual[:first], expected[:first]
+    assert [contacts for _, contacts in actual] == [contacts for _, contacts in expected]
+    times = ([time for time, _ in one] for one in (actual, expected))
+    np.testing.assert_allclose(*times, rtol=rtol)
 
 
 def ageing_force(config: Config, velocity: float) -> float:

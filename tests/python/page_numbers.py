@@ -15,8 +15,6 @@ Other lines are executed, with the text as `page`. `<!-- printed -->` above a bl
 that share.
 """
 
-from __future__ import annotations
-
 import re
 from typing import Any
 

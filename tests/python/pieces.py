@@ -1,7 +1,5 @@
 """Work for processes, which import this module and with it little else."""
 
-from __future__ import annotations
-
 import os
 import signal
 

@@ -5,8 +5,6 @@ which contacts break or attach is shortened to the first of these events, which 
 cubic through both ends of the step.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -2,8 +2,6 @@
 curves and onsets; and how an output differs from its reference.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -13,7 +11,7 @@ from typing import Any
 import mesoslip
 import numpy as np
 import xarray as xr
-from conftest import ROOT, klein_tables
+from conftest import ROOT, drive_in_stages, klein_tables
 from matplotlib.figure import Figure
 
 FOLDER = ROOT / "tests" / "reference"
@@ -24,13 +22,7 @@ PICTURES = ROOT / "out" / "reference"
 # short that motion, which is sensitive to the last digit in the end, is not so yet.
 COMMON = {
     "run__duration": None,
-    "drive": {
-        "stage": [
-            {"duration": 0.03, "velocity": 1e-5},
-            {"duration": 0.005, "velocity": 0.0},
-            {"duration": 0.015, "velocity": -1e-5},
-        ]
-    },
+    "drive": drive_in_stages((0.03, 1e-5), (0.005, 0.0), (0.015, -1e-5)),
     "contacts__count": 120,
     "contacts__threshold__relative_width": 0.1,
     "output__interval": 5e-4,

@@ -1,7 +1,5 @@
 """What is in the state of a run, as the kernels put it away (fortran/numerics/archive.f90)."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Friction of activated contacts: creep, holds, restarts, and the stability of steady sliding."""
 
-from __future__ import annotations
-
 import math
 import re
 
@@ -9,7 +7,7 @@ import mesoslip
 import numpy as np
 import pytest
 import tomli_w
-from conftest import long
+from conftest import drive_in_stages, long
 from mesoslip import Config, MesoslipError, SteadySliding
 from mesoslip.theory.contacts import contact_theory
 from mesoslip.theory.contacts.narrow_thresholds import rate_and_state_of_narrow_thresholds
@@ -56,15 +54,10 @@ def test_damping_of_a_slider_under_a_force_slows_its_creep():
 def test_hold_and_restart_are_those_of_contacts_one_by_one(delay):
     """N contacts slide, stand still and go on; within the noise of N."""
     count, velocity, hold = 20_000, 1e-2, 300.0
-    stages = [
-        {"duration": 800.0, "velocity": velocity},
-        {"duration": hold, "velocity": 0.0},
-        {"duration": 120.0, "velocity": velocity},
-    ]
     config = unit(
         count,
         run__duration=None,
-        drive={"stage": stages},
+        drive=drive_in_stages((800.0, velocity), (hold, 0.0), (120.0, velocity)),
         contacts__threshold={"law": "uniform", "relative_width": 0.3},
         contacts__back_force_ratio=0.05,
         contacts__delay=delay,
@@ -349,11 +342,10 @@ def test_drag_is_part_of_the_direct_effect():
         tables = config.to_dict()
         tables["run"] = {"engine": "me"}
         tables["slider"] = {"kind": "prescribed"}
-        stages = ((14 * length, velocity), (0.1 * length, after))
-        stage = [{"duration": d / one, "velocity": one} for d, one in stages]
-        tables["drive"] = {"stage": stage}
+        before = (14 * length / velocity, velocity)
+        tables["drive"] = drive_in_stages(before, (0.1 * length / after, after))
         tables["output"] = {"interval": 1e-3 * length / velocity}
-        tree = mesoslip.run(Config.from_dict(tables))
+        tree = mesoslip.run(tables)
         moved = tree["displacement"].values[0] - 14 * length
         jumps.append(np.interp(2e-3 * length, moved, tree["contact_force"].values[0]))
     direct = (jumps[0] - jumps[1]) / logarithm

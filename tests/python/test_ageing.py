@@ -1,7 +1,5 @@
 """Contacts that age: limits, independent models, the steady force, and what is refused."""
 
-from __future__ import annotations
-
 import functools
 import itertools
 import math
@@ -9,7 +7,7 @@ import math
 import mesoslip
 import numpy as np
 import pytest
-from conftest import ROOT, at_end, long
+from conftest import ROOT, at_end, drive_in_stages, long
 from kinds import KINDS, configuration, pairwise
 from mesoslip import Config, ConfigError
 from mesoslip.output.tree import build_tree
@@ -33,8 +31,8 @@ STAGES = [(0.02, 1e-6), (0.005, 0.0), (0.05, -1e-6), (0.03, 1e-6)]
 
 
 def staged(factor: float = 1.0) -> dict[str, object]:
-    stages = [{"duration": time, "velocity": factor * velocity} for time, velocity in STAGES]
-    return {"run__duration": None, "drive": {"stage": stages}, "output__interval": 1e-4}
+    drive = drive_in_stages(*((time, factor * velocity) for time, velocity in STAGES))
+    return {"run__duration": None, "drive": drive, "output__interval": 1e-4}
 
 
 PRESCRIBED = {"slider": {"kind": "prescribed"}, "contacts__coupling": "equal"}
@@ -230,14 +228,10 @@ def test_a_break_is_where_force_and_threshold_meet(klein, law, velocity):
 
 def test_contacts_that_weaken_break_at_rest(klein):
     """Stretched to between the old and the young threshold they let go in the hold, when due."""
-    stages = [
-        {"duration": 1e-3, "velocity": 1.2 * STRETCH / 1e-3},
-        {"duration": 1.0, "velocity": 0},
-    ]
     config = klein(
         **PRESCRIBED,
         run__duration=None,
-        drive={"stage": stages},
+        drive=drive_in_stages((1e-3, 1.2 * STRETCH / 1e-3), (1.0, 0)),
         output__interval=1e-2,
         contacts__count=50,
         contacts__threshold__relative_width=0.05,
@@ -434,9 +428,7 @@ def test_restart_peak_grows_with_the_logarithm_of_the_hold(klein, engine):
             **PRESCRIBED,
             run__engine=engine,
             run__duration=None,
-            drive={
-                "stage": [{"duration": time, "velocity": velocity} for time, velocity in stages]
-            },
+            drive=drive_in_stages(*stages),
             output__interval=1e-4,
             contacts__count=4000,
             contacts__initial="steady",

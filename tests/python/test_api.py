@@ -1,16 +1,12 @@
 """The functions of the package: names, what they take, and errors."""
 
-from __future__ import annotations
-
 import math
-import subprocess
-import sys
 
 import mesoslip
 import numpy as np
 import pytest
 import xarray as xr
-from conftest import klein_tables
+from conftest import klein_tables, python
 from mesoslip import MesoslipError
 
 SHORT = {"run__duration": 3.0, "contacts__count": 100, "run__realizations": 2}
@@ -36,11 +32,10 @@ def test_every_name_is_there():
 
 
 def test_import_is_lazy():
-    program = (
+    python(
         "import sys, mesoslip; assert 'numpy' not in sys.modules; "
         "mesoslip.ConfigError; assert 'numpy' not in sys.modules"
     )
-    subprocess.run([sys.executable, "-c", program], check=True)
 
 
 @pytest.mark.parametrize("name", FUNCTIONS_OF_CONFIGURATIONS)

@@ -1,7 +1,5 @@
 """Damaged files, odd streams, outputs in the place of inputs: one message, nothing destroyed."""
 
-from __future__ import annotations
-
 import functools
 import os
 import pydoc
@@ -17,7 +15,7 @@ import numpy as np
 import pytest
 import tomli_w
 from apart import result_of
-from conftest import ROOT, klein_tables, long
+from conftest import ROOT, klein_tables, long, python
 from mesoslip.output import targets
 
 OLD = ROOT / "tests" / "reference" / "old.nc"
@@ -34,11 +32,9 @@ def short(tmp_path):
 def test_functions_are_seen():
     """By dir, completion and help, though they are imported late; docstrings name what exists."""
     code = "import mesoslip, sys; assert 'numpy' not in sys.modules; print(dir(mesoslip))"
-    printed = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, check=True, text=True
-    )
+    printed = python(code)
     for name in ("run", "slips", "avalanche_summary", "Config", "plot"):
-        assert f"'{name}'" in printed.stdout
+        assert f"'{name}'" in printed
         assert name in dir(mesoslip)
     assert "Simulate a configuration." in pydoc.render_doc(mesoslip.run)
     package = Path(mesoslip.__file__).parent
@@ -127,8 +123,7 @@ def test_no_table_or_page_takes_the_place_of_an_output(
     monkeypatch.chdir(tmp_path)
     for one in ("in.nc", "other", "other.nc"):
         Path(one).write_bytes(OLD.read_bytes())
-    status, _, printed = command(*arguments, name)
-    assert status == 2
+    printed = command.refusal(*arguments, name)
     assert "is an output of mesoslip" in printed or "is the name of an output" in printed
     assert {one.read_bytes() for one in tmp_path.iterdir()} == {OLD.read_bytes()}
 

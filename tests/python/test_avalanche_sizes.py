@@ -1,7 +1,5 @@
 """Histograms and power laws of avalanche sizes against brute force, scipy and known laws."""
 
-from __future__ import annotations
-
 import functools
 import itertools
 import json
@@ -698,10 +696,8 @@ def test_ccdf():
 
 
 @pytest.mark.usefixtures("few_replicas")
-def test_a_rejected_fit_is_said_to_be(tmp_path, capsys, monkeypatch):
+def test_a_rejected_fit_is_said_to_be(tmp_path, command, monkeypatch):
     """In the table, in JSON, in the summary and in the picture; and none that is not."""
-    from mesoslip.command_line import main as cli
-
     tables = klein_tables(
         slider={"kind": "quasistatic", "stiffness": 60.0},
         run={"avalanches": 10_000, "seed": 3},
@@ -715,26 +711,18 @@ def test_a_rejected_fit_is_said_to_be(tmp_path, capsys, monkeypatch):
     config.write_text(Config.from_dict(tables).to_toml())
     output = tmp_path / "sliding.nc"
 
-    def command(*words: object) -> str:
-        monkeypatch.setattr("sys.argv", ["mesoslip", *map(str, words)])
-        try:
-            cli.main()
-        except SystemExit as stop:
-            if stop.code:
-                raise
-        return capsys.readouterr().out
-
-    command("run", config, "-o", output, "--quiet")
+    assert command("run", config, "-o", output, "--quiet")[0] == 0
     tree = mesoslip.avalanche_summary(output)
     assert tree["fit_rejected"] == 0
     assert tree["tested_count"] == tree["fitted_count"] == tree["fitted_share"] * tree["count"]
-    assert "warning" not in command("avalanches", output)
+    assert "warning" not in command.output("avalanches", output)
 
     # The plain law from the first size on, whose correction it does not have.
     monkeypatch.setattr(avalanche_catalogue, "fit_power_law", fit_plain)
-    shown = command("avalanches", output, "--min-size", 1)
+    words = ("avalanches", output, "--min-size", 1)
+    shown = command.output(*words)
     assert "warning: the sizes do not follow this law (p = 0.048)" in shown
-    answer = json.loads(command("avalanches", output, "--min-size", 1, "--json"))["statistics"]
+    answer = json.loads(command.output(*words, "--json"))["statistics"]
     assert answer["fit_rejected"] == 1
     assert answer["tested_count"] == answer["count"]
     for law in ("pure", "lognormal", "stretched_exponential"):

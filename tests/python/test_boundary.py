@@ -1,15 +1,12 @@
 """What crosses the boundary to Fortran, by its name on both sides."""
 
-from __future__ import annotations
-
 import ast
 import re
-import subprocess
 import sys
 from dataclasses import fields
 
 import pytest
-from conftest import ROOT
+from conftest import ROOT, python
 from kinds import KINDS, configuration
 from mesoslip import _core
 from mesoslip.configuration.contacts.tables import ageing, contacts, interaction
@@ -105,10 +102,8 @@ with mesoslip.Realization(mesoslip.Config.load(sys.argv[1], overrides=overrides)
 )
 def test_memory_that_is_refused_is_an_error(room, message):
     """The kernel does not stop the program, as Fortran's library does for small allocations."""
-    command = [sys.executable, "-c", WITHOUT_MEMORY, str(ROOT / "runs" / "klein.toml"), str(room)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
-    assert done.returncode == 0, done.stderr
-    assert message in done.stdout
+    printed = python(WITHOUT_MEMORY, ROOT / "runs" / "klein.toml", room, timeout=60)
+    assert message in printed
 
 
 def with_contacts(config) -> Kernel:

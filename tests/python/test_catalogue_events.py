@@ -1,7 +1,5 @@
 """The b-value, Omori's decay, and a second channel beside slips."""
 
-from __future__ import annotations
-
 import json
 
 import mesoslip
@@ -9,7 +7,8 @@ import numpy as np
 import pytest
 import xarray as xr
 from event_coverage import sequence, sizes
-from mesoslip.analysis.events import b_value, emissions_of, omori
+from mesoslip.analysis.events.channel import emissions_of
+from mesoslip.analysis.events.laws import b_value, omori
 from mesoslip.errors import ConfigError, FileError
 
 
@@ -145,8 +144,7 @@ def test_command_and_messages(trace, command, tmp_path):
         ("--main-size", "inf", "main_size = inf: must be a finite number of at least 0"),
         ("--threshold", "3", "threshold = 3.0: is that of the channel, and these events are slips"),
     ):
-        status, _, err = command("events", path, "--of", "slips", option, value)
-        assert status == 2
+        err = command.refusal("events", path, "--of", "slips", option, value)
         assert words in err
     assert len((tmp_path / "a.csv").read_text().splitlines()) == 11
     with pytest.raises(ConfigError, match="must be one of slips, avalanches, channel"):

@@ -1,7 +1,5 @@
 """Sweeps whose runs go on from the end of the last one: `sweep.continue`."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import mesoslip

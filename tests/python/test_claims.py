@@ -1,7 +1,5 @@
 """The source's claims: that each is judged, by what was measured and not otherwise."""
 
-from __future__ import annotations
-
 import json
 import re
 import runpy

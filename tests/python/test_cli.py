@@ -1,7 +1,5 @@
 """The command line: what it makes, and one clear message for every mistake."""
 
-from __future__ import annotations
-
 import contextlib
 import csv
 import json
@@ -9,7 +7,6 @@ import math
 import os
 import re
 import signal
-import subprocess
 import sys
 from types import SimpleNamespace
 
@@ -19,7 +16,7 @@ import numpy as np
 import pytest
 import tomli_w
 import xarray as xr
-from conftest import ROOT, klein_tables, long
+from conftest import ROOT, klein_tables, long, python, run_program
 from mesoslip.analysis.regime import outputs
 from mesoslip.command_line import run as run_command
 from mesoslip.command_line.main import COMMANDS, GROUPS, app
@@ -60,8 +57,7 @@ WIDE = ("--set", "contacts.threshold.relative_width=0.1")
 
 def test_run_writes_a_cf_file(short, tmp_path, command):
     output = tmp_path / "deep" / "short.nc"
-    status, _, printed = command("run", short, "-o", output, "--set", "run.realizations=2")
-    assert status == 0
+    printed = command.messages("run", short, "-o", output, "--set", "run.realizations=2")
     assert str(output) in printed
     assert [path.name for path in output.parent.iterdir()] == ["short.nc"]
     with xr.open_datatree(output) as tree:
@@ -236,8 +232,7 @@ def test_an_interrupt_after_the_output_is_written_is_answered_at_once(
 
     monkeypatch.setattr(outputs, "classify", classify_once)
     many = ("--set", "run.realizations=20", "--set", "run.duration=0.1 s")
-    status, _, err = command("run", short, "-o", output, *many)
-    assert status == 0
+    err = command.messages("run", short, "-o", output, *many)
     assert len(judged) == 1
     assert f"{output}: complete; 'mesoslip regime {output}' prints the regime\n" in err
     assert list(tmp_path.glob("run.*")) == [output]
@@ -301,12 +296,11 @@ def test_all_that_takes_a_while_reports_its_progress(tmp_path, command, monkeypa
 
 def test_start_up_is_quick():
     """No package that takes long is imported before it is needed."""
-    code = (
+    python(
         "import sys, mesoslip.command_line.main, mesoslip.theory.derived\n"
         "slow = {'matplotlib', 'scipy', 'xarray', 'netCDF4', 'pint', 'rich'} & sys.modules.keys()\n"
         "assert not slow, slow"
     )
-    subprocess.run([sys.executable, "-c", code], check=True)
 
 
 def test_a_run_needs_no_thread_for_imports(short, tmp_path, command, monkeypatch):
@@ -367,8 +361,7 @@ for arguments in {commands}:
 import dask.array, pint
 json.dump(found, stdout)
 """
-    done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
-    assert json.loads(done.stdout) == [
+    assert json.loads(python(code)) == [
         [],
         [],
         ["netCDF4"],
@@ -466,8 +459,7 @@ def test_onset_writes_both_equations(short, tmp_path, command):
 
 def test_the_master_equation_runs_like_contacts(short, tmp_path, command):
     output = tmp_path / "me.nc"
-    status, _, printed = command("run", short, "-o", output, "--set", "run.engine=me")
-    assert status == 0
+    printed = command.messages("run", short, "-o", output, "--set", "run.engine=me")
     assert "1 slip; " in printed
     assert command("slips", output)[0] == 0
     assert command("plot", output)[0] == 0
@@ -618,10 +610,8 @@ def test_messages_do_not_steer_the_terminal(capsys):
 def test_a_matplotlibrc_of_the_current_folder_is_not_read(module, content, tmp_path):
     (tmp_path / "matplotlibrc").write_bytes(content)
     code = f"import mesoslip.{module}, matplotlib; assert not matplotlib.rcParams['text.usetex']"
-    done = subprocess.run(
-        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
-    )
-    assert (done.returncode, done.stderr) == (0, "")
+    done = run_program(sys.executable, "-c", code, cwd=tmp_path)
+    assert done == (0, "", "")
 
 
 @pytest.mark.parametrize("module", ["lazy_loader", "mesoslip.command_line.main", "typer"])
@@ -637,15 +627,13 @@ sys.meta_path.insert(0, Interrupt())
 sys.argv = ["/usr/bin/mesoslip", "--version"]
 runpy.run_module("mesoslip", run_name="__main__")
 """
-    done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True)
-    assert (done.returncode, done.stdout, done.stderr) == (130, b"", b"")
+    assert run_program(sys.executable, "-c", code) == (130, "", "")
 
 
 def test_nothing_is_imported_before_interrupts_are_caught():
     code = "import sys; sys.argv = ['/usr/bin/mesoslip']; import mesoslip"
-    line = [sys.executable, "-I", "-X", "importtime", "-c", code]
-    done = subprocess.run(line, check=True, capture_output=True, text=True)
-    names = [one.rpartition("|")[2].strip() for one in done.stderr.splitlines()]
+    _, _, timed = run_program(sys.executable, "-I", "-X", "importtime", "-c", code)
+    names = [one.rpartition("|")[2].strip() for one in timed.splitlines()]
     assert names[names.index("site") + 1] == "mesoslip._start"
 
 

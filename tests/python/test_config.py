@@ -1,13 +1,9 @@
 """Configurations: what is accepted, what is refused, and with which words."""
 
-from __future__ import annotations
-
 import contextlib
 import math
 import os
 import re
-import subprocess
-import sys
 import tomllib
 from datetime import date
 
@@ -16,7 +12,7 @@ import numpy as np
 import pint
 import pytest
 import tomli_w
-from conftest import ROOT, klein_tables
+from conftest import ROOT, drive_in_stages, klein_tables, python
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mesoslip import Config, ConfigError, FileError, MesoslipError, ThresholdLaw
@@ -276,7 +272,7 @@ def test_lengths_of_a_run():
 def test_the_time_for_a_path_length_of_stages(klein, way, duration):
     """There, a hold, back, and on after the end of the last stage."""
     stages = [(2.0, 1e-6), (1.0, 0.0), (2.0, -1e-6), (2.0, 2e-6)]
-    drive = {"stage": [{"duration": time, "velocity": velocity} for time, velocity in stages]}
+    drive = drive_in_stages(*stages)
     config = klein(run={"drive_displacement": way}, drive=drive)
     assert config.duration == pytest.approx(duration)
     assert math.fsum(part.path_length for part in config.drive_parts) == pytest.approx(way)
@@ -440,15 +436,7 @@ def test_units_need_no_files(tmp_path):
         "import sys; from mesoslip.configuration.units import to_si; to_si('97 N/m', 'N/m', '');"
         "assert 'pint' not in sys.modules; print(to_si('1 minute', 's', ''))"
     )
-    answer = subprocess.run(
-        [sys.executable, "-c", code],
-        env=environment,
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert answer.stdout == "60.0\n"
+    assert python(code, env=environment, cwd=tmp_path) == "60.0\n"
 
 
 @given(st.text(max_size=12))
@@ -926,7 +914,7 @@ def test_tables_on_a_base(tmp_path, monkeypatch):
 def test_stages_and_duration(stages, duration, expected):
     tables = klein_tables(
         run__duration=duration,
-        drive={"stage": [{"duration": time, "velocity": velocity} for time, velocity in stages]},
+        drive=drive_in_stages(*stages),
     )
     parts = Config.from_dict(tables).drive_parts
     assert tuple((part.duration, part.start_velocity) for part in parts) == expected

@@ -1,7 +1,5 @@
 """Delays that are drawn from the exponential law, in both engines and in the linear response."""
 
-from __future__ import annotations
-
 import mesoslip
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Units in which numbers are read, and what configurations change of each other."""
 
-from __future__ import annotations
-
 import mesoslip
 import pytest
 import tomli_w

@@ -5,8 +5,6 @@ Blocks are gone through as a reader does, in an empty folder (README: in a clone
 parts of a file. Of a block after ``not run: reason`` commands are parsed, and no more is done.
 """
 
-from __future__ import annotations
-
 import doctest
 import json
 import re
@@ -381,7 +379,7 @@ def check_targets(targets):
 def test_names_of_the_glossary_are_those_of_the_program():
     """Keys, lines of info and curve, variables of outputs, tables of fits, and commands."""
     from mesoslip.analysis import slips
-    from mesoslip.analysis.rate_and_state import FIT
+    from mesoslip.analysis.rate_and_state.rows import FIT
     from mesoslip.configuration.messages import all_keys
     from mesoslip.output import variables
     from mesoslip.theory import curve, slip_onset

@@ -1,13 +1,11 @@
 """The event-driven run against independent models of the same contacts."""
 
-from __future__ import annotations
-
 import mesoslip
 import numpy as np
 import pytest
-from conftest import long
+from conftest import drive_in_stages, long
 from mesoslip.simulation.realization import Realization
-from oracles import exact_events, fixed_step
+from oracles import assert_same_events, exact_events, fixed_step
 
 # Fast loading, so that a slip comes within some ten milliseconds.
 FAST = {
@@ -59,10 +57,7 @@ def test_events_are_those_of_matrix_exponentials(klein, changes):
     assert len(expected) >= (1 if not config.contacts.reattach else 5)
     # What follows many breaks is sensitive to rounding; the first dozens must agree.
     first = min(len(expected), 40)
-    assert [contact for _, contact in actual[:first]] == [one for _, one in expected[:first]]
-    np.testing.assert_allclose(
-        [time for time, _ in actual[:first]], [time for time, _ in expected[:first]], rtol=1e-9
-    )
+    assert_same_events(actual, expected, first)
 
 
 @pytest.mark.parametrize("coupling", ["scaled", long("equal")])
@@ -98,7 +93,7 @@ def test_prescribed_with_reversals_and_holds(klein):
     stages = [(0.02, 1e-6), (0.005, 0.0), (0.05, -1e-6), (0.03, 1e-6)]
     config = klein(
         run__duration=None,
-        drive={"stage": [{"duration": time, "velocity": velocity} for time, velocity in stages]},
+        drive=drive_in_stages(*stages),
         slider={"kind": "prescribed"},
         contacts__count=20,
         contacts__threshold__relative_width=0.2,

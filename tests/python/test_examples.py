@@ -1,23 +1,19 @@
 """What comes with the program: its runs in the wheel, and what a missing library reports."""
 
-from __future__ import annotations
-
-import subprocess
 import sys
 from importlib.metadata import files
 
 import mesoslip
 import pytest
-from conftest import ROOT
+from conftest import ROOT, python, run_program
 from mesoslip import examples
 
 
 def tracked(folder):
     """Files of the repository in a folder."""
-    listed = subprocess.run(
-        ["git", "ls-files", folder], cwd=ROOT, capture_output=True, text=True, check=True
-    )
-    return [line for line in listed.stdout.splitlines() if (ROOT / line).exists()]
+    status, listed, errors = run_program("git", "ls-files", folder, cwd=ROOT)
+    assert status == 0, errors
+    return [line for line in listed.splitlines() if (ROOT / line).exists()]
 
 
 def is_example(path):
@@ -125,16 +121,13 @@ def test_libraries_without_memory_are_no_crash(megabytes):
     """Which would wait for it without end, or crash."""
     line = f'ulimit -v {1024 * megabytes}; exec "$@"'
     command = [sys.executable, "-m", "mesoslip", "curve", str(ROOT / "runs" / "klein.toml")]
-    result = subprocess.run(
-        ["bash", "-c", line, "bash", *command], capture_output=True, text=True, check=False
-    )
-    assert result.returncode == 1, result.stderr
-    assert result.stderr == "mesoslip: there is not enough memory for this\n"
+    status, _, errors = run_program("bash", "-c", line, "bash", *command)
+    assert (status, errors) == (1, "mesoslip: there is not enough memory for this\n")
 
 
 def test_xarray_that_was_imported_before_keeps_its_packages():
     """It counts on Dask once it has seen that there is one."""
-    code = """
+    python("""
 import sys, xarray
 from xarray.namedarray.utils import module_available
 from mesoslip.array_packages import hidden
@@ -142,5 +135,4 @@ module_available("dask")
 with hidden():
     assert "dask" not in sys.modules or sys.modules["dask"] is not None
     xarray.Dataset({"a": ("x", [1.0])}).load()
-"""
-    subprocess.run([sys.executable, "-c", code], check=True)
+""")

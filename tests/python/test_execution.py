@@ -1,7 +1,5 @@
 """Executors, their store and their stop: nothing is lost, and files of others stay as they are."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal
@@ -16,7 +14,7 @@ import mesoslip
 import numpy as np
 import pytest
 import xarray as xr
-from conftest import klein_tables, long
+from conftest import klein_tables, long, run_program
 from mesoslip import Config, ConfigError, FileError
 from mesoslip.campaign.sweep_plan import Plan
 from mesoslip.execution import local
@@ -378,8 +376,7 @@ def test_checkpoints_of_stopped_runs_are_kept_until_one_is_complete(tmp_path, ru
             seeds.append(json.loads(str(file["header"]))["configuration"])
     found = [Config.from_toml(one).run.seed for one in seeds]
     assert found == [3, 1, 2]
-    status, _, message = command("run", run_file, "-o", output)
-    assert status == 0, message
+    command.messages("run", run_file, "-o", output)
     assert sorted(one.name for one in tmp_path.iterdir()) == ["out.nc", "run.toml"]
 
 
@@ -399,19 +396,13 @@ def test_workers_take_no_module_from_the_current_folder(tmp_path):
     """Such as a json.py that somebody has left there."""
     for name in ("json", "numpy", "mesoslip", "multiprocessing", "threading"):
         (tmp_path / f"{name}.py").write_text(f"open('{tmp_path}/imported', 'w').close()\n")
-    program = Path(sys.executable).with_name("mesoslip")
     (tmp_path / "sweep.toml").write_text(
         Config.from_dict(TINY).to_toml()
         + '\n[sweep]\nmeasures = ["breaks"]\n[sweep.grid]\n"contacts.delay" = [1e-4]\n'
     )
-    done = subprocess.run(
-        [program, "sweep", "sweep.toml", "--pool", "processes", "--workers", "1", "--quiet"],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert (done.returncode, done.stderr) == (0, "")
+    line = ("sweep", "sweep.toml", "--pool", "processes", "--workers", "1", "--quiet")
+    status, _, errors = run_program(Path(sys.executable).with_name("mesoslip"), *line, cwd=tmp_path)
+    assert (status, errors) == (0, "")
     assert not (tmp_path / "imported").exists()
 
 

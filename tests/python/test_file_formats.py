@@ -1,7 +1,5 @@
 """Workbooks, files of LabVIEW and time stamps, as laboratories have them."""
 
-from __future__ import annotations
-
 import datetime
 
 import nptdms

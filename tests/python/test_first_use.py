@@ -1,7 +1,5 @@
 """Measured stick-slip in any unit, direction and time, from the file to the picture."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass
 
@@ -9,7 +7,7 @@ import mesoslip
 import numpy as np
 import pytest
 from conftest import long
-from mesoslip.analysis.regime import IRREGULAR, STICK_SLIP
+from mesoslip.analysis.regime.result import IRREGULAR, STICK_SLIP
 
 TEETH = 30
 

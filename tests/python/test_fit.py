@@ -1,7 +1,5 @@
 """Fits: the machinery on problems whose posterior is known, and traces whose truth is."""
 
-from __future__ import annotations
-
 import json
 import math
 import re
@@ -14,7 +12,7 @@ import mesoslip
 import numpy as np
 import pytest
 import tomli_w
-from conftest import klein_tables, long
+from conftest import drive_in_stages, klein_tables, long
 from mesoslip.errors import ConfigError, FileError, WriteError
 from mesoslip.execution.stop import Stop, StoppedError
 from mesoslip.execution.store import Store
@@ -597,12 +595,8 @@ def test_a_trace_may_count_from_a_time_on():
 
 def test_a_trace_of_several_stages_may_start_at_any_time():
     """Simulations follow the stages from the first sample on."""
-    stages = [
-        {"duration": 2.0, "velocity": 1e-7},
-        {"duration": 0.5, "velocity": 0.0},
-        {"duration": 1.5, "velocity": 2e-7},
-    ]
-    drive = {"run__duration": None, "drive": {"stage": stages}}
+    stages = drive_in_stages((2.0, 1e-7), (0.5, 0.0), (1.5, 2e-7))
+    drive = {"run__duration": None, "drive": stages}
     tree = experiment(**drive)
     later = tree.copy()
     later.dataset = tree.to_dataset().assign_coords(time=tree["time"] + 100.0)

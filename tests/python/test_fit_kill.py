@@ -1,7 +1,5 @@
 """Fits that are killed: nothing is lost, and the posterior is the same to the bit."""
 
-from __future__ import annotations
-
 import kill_fit
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """The force curve of the master equation against closed forms and an independent solution."""
 
-from __future__ import annotations
-
 import mesoslip
 import numpy as np
 import pytest

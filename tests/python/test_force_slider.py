@@ -1,7 +1,5 @@
 """A slider under a force: closed forms, conservation, and the force curve."""
 
-from __future__ import annotations
-
 import math
 import tomllib
 
@@ -198,6 +196,6 @@ def test_a_slider_at_rest_up_to_rounding_follows_a_growing_force(seed):
     ]
     del tables["run"]["duration"]
     tables["run"] |= {"realizations": 1, "seed": seed}
-    tree = mesoslip.run(Config.from_dict(tables))
+    tree = mesoslip.run(tables)
     assert tree["time"].values[-1] == pytest.approx(5.1)
     assert tree["contact_force"].values[0, 5000:].max() > 0.6 * config.contacts.static_force

@@ -1,7 +1,5 @@
 """The response of a slider under a force: creep, static friction, the motion in words."""
 
-from __future__ import annotations
-
 import json
 import math
 
@@ -10,7 +8,7 @@ import numpy as np
 import pytest
 from conftest import klein_tables
 from mesoslip import Config
-from mesoslip.analysis.response import rows_of, scalars_of
+from mesoslip.analysis.response.dataset import rows_of, scalars_of
 from mesoslip.theory.contacts import contact_theory
 
 SLIDER = {"kind": "force", "mass": 1.47e-3, "damping": 500.0}

@@ -1,11 +1,8 @@
 """Outputs of others: nothing outside of them is read; and reading on many threads."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import struct
-import subprocess
 import sys
 
 import h5py
@@ -13,7 +10,7 @@ import mesoslip
 import netCDF4
 import numpy as np
 import pytest
-from conftest import ROOT
+from conftest import ROOT, run_program
 
 OLD = ROOT / "tests" / "reference" / "eq-rigid-scaled.nc"
 
@@ -114,10 +111,10 @@ def test_a_damaged_heap_is_not_read_without_end(output, values, tmp_path):
     commands = (["slips", output], ["trace", table, "-o", tmp_path / "new.nc"])
     for arguments, words in zip(commands, ("netCDF-4 file", "file of HDF5"), strict=True):
         _damage_heap(arguments[1], values)
-        program = [sys.executable, "-m", "mesoslip", *map(str, arguments)]
-        result = subprocess.run(program, capture_output=True, text=True, check=False, timeout=60)
-        assert result.returncode == 2
-        assert f"{arguments[1]}: a damaged {words}" in result.stderr
+        line = (sys.executable, "-m", "mesoslip", *arguments)
+        status, _, errors = run_program(*line, timeout=60)
+        assert status == 2
+        assert f"{arguments[1]}: a damaged {words}" in errors
 
 
 @pytest.mark.parametrize("block", [64, 700, 5000, 2**23])
@@ -263,11 +260,5 @@ print(errors)
 
 @pytest.mark.long
 def test_outputs_are_read_on_many_threads(output):
-    done = subprocess.run(
-        [sys.executable, "-c", THREADS, output],
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=120,
-    )
-    assert (done.returncode, done.stdout, done.stderr) == (0, "[]\n", "")
+    done = run_program(sys.executable, "-c", THREADS, output, timeout=120)
+    assert done == (0, "[]\n", "")

@@ -1,7 +1,5 @@
 """Slips found in traces with noise of every kind, and what lies between them."""
 
-from __future__ import annotations
-
 import math
 
 import mesoslip
@@ -10,8 +8,8 @@ import pytest
 from conftest import klein_tables, long
 from made_records import judge, made_record
 from mesoslip.analysis.alternating_extremes import extremes_of
-from mesoslip.analysis.rate_and_state import Loading
-from mesoslip.analysis.regime import SMOOTH, STICK_SLIP, TRANSIENT
+from mesoslip.analysis.rate_and_state.points import Loading
+from mesoslip.analysis.regime.result import SMOOTH, STICK_SLIP, TRANSIENT
 from mesoslip.analysis.sampled_slips import find_slips, windows
 from mesoslip.analysis.sampled_slips.windows import Windows, lines_through, parabolas_through
 from mesoslip.analysis.stick_phases import stick_phases

@@ -1,7 +1,5 @@
 """Fronts of an interface with a length: found in made ruptures, and in runs."""
 
-from __future__ import annotations
-
 import json
 import re
 from typing import Any

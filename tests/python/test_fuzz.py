@@ -1,9 +1,6 @@
 """A small part of the attack (tests/fuzz), always the same; and what it must be able to see."""
 
-from __future__ import annotations
-
 import signal
-import subprocess
 import sys
 import threading
 import time
@@ -16,7 +13,7 @@ import tomli_w
 import xarray as xr
 from apart import Command
 from configurations import NASTY, draw, mutate, text
-from conftest import ROOT, klein_tables, long
+from conftest import ROOT, klein_tables, long, run_program
 from invariants import broken, left_over
 from kinds import configuration
 from mesoslip.simulation.run_realizations import run_realizations
@@ -28,11 +25,11 @@ ANSWER_SECONDS = 3.0
 def test_attack():
     """A few cases of most attacks, each in a process of its own; make fuzz tries thousands."""
     counts = "configurations=1 mutations=1 checkpoints=1 calls=1"
-    line = [sys.executable, ROOT / "tests" / "fuzz" / "fuzz.py", *counts.split(), "--jobs", "1"]
-    line += ["--seed", "2026", "--no-keep"]
-    result = subprocess.run(line, capture_output=True, text=True, check=False)
-    assert result.returncode == 0, result.stdout[-3000:] + result.stderr[-3000:]
-    assert "mutations" in result.stdout
+    options = ("--jobs", "1", "--seed", "2026", "--no-keep")
+    script = ROOT / "tests" / "fuzz" / "fuzz.py"
+    status, printed, errors = run_program(sys.executable, script, *counts.split(), *options)
+    assert status == 0, printed[-3000:] + errors[-3000:]
+    assert "mutations" in printed
 
 
 def test_cases_are_made_again_from_their_names():

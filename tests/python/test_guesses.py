@@ -1,11 +1,9 @@
 """Each guess about a file, where it is wrong: it is printed, and one option overrules it."""
 
-from __future__ import annotations
-
 import mesoslip
 import numpy as np
 import pytest
-from mesoslip.analysis.strokes import strokes_of
+from mesoslip.analysis.strokes.catalogue import strokes_of
 from mesoslip.measured.understanding import understand
 
 COUNT = 40

@@ -1,13 +1,8 @@
 """Files as instruments write them: each is a small made one in the form of its instrument."""
 
-from __future__ import annotations
-
-import h5py
 import mesoslip
-import netCDF4
 import numpy as np
 import pytest
-from scipy.io import savemat
 
 TIME = np.arange(12) * 0.5
 FORCE = 1.5 + 0.25 * (np.arange(12) % 3)
@@ -136,62 +131,11 @@ def test_texts_of_instruments(name, tmp_path):
     text, options = TEXTS[name]
     path = tmp_path / "a.txt"
     path.write_text(text, encoding="utf-8")
-    check(mesoslip.read_trace(path, **options))
-
-
-def check(tree):
+    tree = mesoslip.read_trace(path, **options)
     name = "spring_force" if "spring_force" in tree else "friction_coefficient"
     scale = 1.0 if name == "spring_force" else LOAD
     assert scale * tree[name].values[0] == pytest.approx(FORCE, rel=1e-3)
     assert np.diff(tree["time"].values) == pytest.approx(np.full(11, 0.5), rel=1e-6)
-
-
-def hdf5(path):
-    with h5py.File(path, "w") as file:
-        for name, unit, values in (("time", "s", TIME), ("force", "mN", 1e3 * FORCE)):
-            file[f"measurement/{name}"] = values
-            file[f"measurement/{name}"].attrs["units"] = unit
-
-
-def netcdf(path):
-    with netCDF4.Dataset(path, "w") as file:
-        file.createDimension("time", 12)
-        for name, unit, values in (("time", "s", TIME), ("force", "N", FORCE)):
-            one = file.createVariable(name, "f8", ("time",))
-            one.units = unit
-            one[:] = values
-
-
-def workbook(path):
-    openpyxl = pytest.importorskip("openpyxl")
-    book = openpyxl.Workbook()
-    for row in [("time [s]", "force [N]"), *zip(TIME.tolist(), FORCE.tolist(), strict=True)]:
-        book.active.append(row)
-    book.save(path)
-
-
-def tdms(path):
-    nptdms = pytest.importorskip("nptdms")
-    with nptdms.TdmsWriter(path) as file:
-        times = {"wf_increment": 0.5, "wf_start_offset": 0.0, "unit_string": "N"}
-        file.write_segment([nptdms.ChannelObject("rig", "Friction force", FORCE, times)])
-
-
-BINARIES = {
-    "LabVIEW (.tdms)": ("a.tdms", tdms),
-    "Excel": ("a.xlsx", workbook),
-    "HDF5": ("a.h5", hdf5),
-    "netCDF": ("a.nc", netcdf),
-    "MATLAB": ("a.mat", lambda path: savemat(path, {"time_s": TIME, "force_N": FORCE})),
-    "NumPy": ("a.npz", lambda path: np.savez(path, time_s=TIME, force_N=FORCE)),
-}
-
-
-@pytest.mark.parametrize("name", BINARIES)
-def test_binary_files(name, tmp_path):
-    file, write = BINARIES[name]
-    write(tmp_path / file)
-    check(mesoslip.read_trace(tmp_path / file))
 
 
 def test_a_lone_load_cell_pulls(tmp_path):

@@ -1,16 +1,14 @@
 """Contacts that push their neighbours over, and the slider without inertia."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
 import pytest
-from conftest import at_end, long
+from conftest import at_end, drive_in_stages, long
 from mesoslip import Config
 from mesoslip.simulation.realization import Realization
 from mesoslip.simulation.recorded_tables import AVALANCHE_COLUMNS
-from oracles import exact_events, quasistatic
+from oracles import assert_same_events, exact_events, quasistatic
 from states import reals, saved, taken_up
 
 # Few contacts under a fast drive; the area makes the bonds a few times as stiff as the contacts.
@@ -81,10 +79,7 @@ def test_events_are_those_of_forces_recomputed_at_every_event(klein, kind, size,
         renewals = now
     # What follows many breaks is sensitive to rounding; the first dozens must agree.
     first = min(len(expected), 25)
-    assert [contacts for _, contacts in actual[:first]] == [one for _, one in expected[:first]]
-    np.testing.assert_allclose(
-        [time for time, _ in actual[:first]], [time for time, _ in expected[:first]], rtol=1e-9
-    )
+    assert_same_events(actual, expected, first)
     np.testing.assert_array_equal(
         column(realization, "size")[:first], [len(contacts) for _, contacts in expected[:first]]
     )
@@ -237,12 +232,8 @@ def test_segments_and_snapshots_do_not_change_a_run(klein, slider):
         "run__duration": 2.0,
         "interaction": {"strength": 0.1, "columns": 60, "rows": 68},
         "contacts__initial": "steady",
-        "drive": {
-            "velocity": None,
-            "stage": [{"duration": 1, "velocity": 5e-7}, {"duration": 1, "velocity": -5e-7}],
-        },
+        "drive": drive_in_stages((0.15 if slider == "prescribed" else 1, 5e-7), (1, -5e-7)),
     }
-    del changes["drive"]["velocity"]
     changes["slider"] = {
         "rigid": {"mass": 1.47e-3, "stiffness": 97.0, "damping_ratio": 0.2},
         "layered": {"kind": "layered", "mass": 1.47e-3, "stiffness": 97.0, "layers": 3},
@@ -251,7 +242,6 @@ def test_segments_and_snapshots_do_not_change_a_run(klein, slider):
     }[slider]
     if slider == "prescribed":
         changes["run__duration"] = 0.3
-        changes["drive"]["stage"][0]["duration"] = 0.15
     config = klein(**changes)
     times = (0.0, 0.1, 0.2, 0.2000001, config.duration)
     whole = finish(config)

@@ -1,12 +1,10 @@
 """An interface with a length: exact checks of the model, and a plain code of the same contacts."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
 import pytest
-from conftest import ROOT, at_end, long
+from conftest import ROOT, at_end, drive_in_stages, long
 from mesoslip import Config, Realization
 from numpy.typing import NDArray
 from plain_interface import PlainInterface
@@ -267,8 +265,7 @@ def test_a_block_that_slides_without_a_slip_does_not_rupture():
     tables["contacts"]["threshold"]["relative_width"] = 0.5
     del tables["run"]["duration"]
     tables["output"]["slip_velocity"] = 3.0
-    slow, fast = ({"duration": 4.2, "velocity": 0.4}, {"duration": 2.0, "velocity": 20.0})
-    tables["drive"] = {"stage": [slow, fast]}
+    tables["drive"] = drive_in_stages((4.2, 0.4), (2.0, 20.0))
     one = finished(tables)
     assert one.breaks == OF_BLOCK
     assert not one.table("ruptures").sizes["rupture"]

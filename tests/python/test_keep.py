@@ -1,7 +1,5 @@
 """Contacts that keep their thresholds in all their lives (model section 19)."""
 
-from __future__ import annotations
-
 import itertools
 import math
 

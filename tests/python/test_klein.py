@@ -1,7 +1,5 @@
 """Klein's case: what the source says of it."""
 
-from __future__ import annotations
-
 import mesoslip
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Elastic sliders against the rigid one, closed forms, matrix exponentials, other integrators."""
 
-from __future__ import annotations
-
 import mesoslip
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Stages found in the displacement of a load point, against the drive that made it."""
 
-from __future__ import annotations
-
 import time as clock
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Lyapunov exponents and return maps against closed forms."""
 
-from __future__ import annotations
-
 import json
 import math
 
@@ -45,7 +43,7 @@ def test_distances_of_a_linear_system_decay_with_its_slowest_mode():
 def test_a_run_that_ends_before_a_twin_starts_is_too_short():
     tables = klein_tables(**PINNED, run__stop={"displacement": 1e-9})
     with pytest.raises(RunError, match=r"displacement of the slider reached.*a longer run is"):
-        mesoslip.lyapunov(Config.from_dict(tables), twins=4, duration=0.5, executor=1)
+        mesoslip.lyapunov(tables, twins=4, duration=0.5, executor=1)
 
 
 def test_a_twin_that_is_not_displaced_is_the_run_itself():

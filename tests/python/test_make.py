@@ -1,16 +1,13 @@
 """What make finds stale: an output after an edit of its run, or of any file that is based on."""
 
-from __future__ import annotations
-
 import os
 import runpy
 import shutil
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
-from conftest import ROOT, long
+from conftest import ROOT, long, run_program
 
 # Stands for mesoslip: it states what it is asked to do, and does it by touching the output.
 PROGRAM = """#!/bin/sh
@@ -50,22 +47,14 @@ def checkout(tmp_path):
 
 def made(checkout, *targets):
     """What the program was asked to do by make."""
-    done = subprocess.run(
-        # Nothing is to be installed here.
-        [
-            *("make", "-j2", "-s", "-o", ".venv/.installed"),
-            *("MESOSLIP=./mesoslip", f"PYTHON={sys.executable}"),
-            *targets,
-        ],
-        cwd=checkout,
-        capture_output=True,
-        text=True,
-        check=False,
-        env={name: text for name, text in os.environ.items() if not name.startswith("MAKE")},
+    # Nothing is to be installed here.
+    make = ("make", "-j2", "-s", "-o", ".venv/.installed", "MESOSLIP=./mesoslip")
+    environment = {name: one for name, one in os.environ.items() if not name.startswith("MAKE")}
+    status, printed, errors = run_program(
+        *make, f"PYTHON={sys.executable}", *targets, cwd=checkout, env=environment
     )
-    assert done.returncode == 0, done.stderr
-    assert done.stderr == ""
-    return sorted(line for line in done.stdout.splitlines() if "Nothing" not in line)
+    assert (status, errors) == (0, "")
+    return sorted(line for line in printed.splitlines() if "Nothing" not in line)
 
 
 def edit(checkout, name):
@@ -188,15 +177,9 @@ def test_an_edit_of_what_a_picture_shows_makes_it_stale(tmp_path, edited, old, n
 
 def test_the_runs_of_this_repository():
     """Their chains end with Klein's case or that of an interface, or they stand alone."""
-    answer = subprocess.run(
-        [sys.executable, "tools/bases", "runs"],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        check=True,
-    )
+    _, printed, _ = run_program(sys.executable, "tools/bases", "runs", cwd=ROOT)
     chains: dict[str, list[str]] = {}
-    for line in answer.stdout.splitlines():
+    for line in printed.splitlines():
         run, base = line.split(">")
         chains.setdefault(run, []).append(base)
     for path in sorted((ROOT / "runs").glob("*.toml")):

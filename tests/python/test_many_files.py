@@ -1,7 +1,5 @@
 """Files that are parts of one test, and files that are read with one description."""
 
-from __future__ import annotations
-
 import csv
 
 import mesoslip
@@ -155,8 +153,7 @@ def test_wrong_batches_are_one_message(folder, command):
         assert not (folder / "t.csv").exists()
     first = folder / "first.csv"
     first.write_text(text(0, 100))
-    status, _, messages = command("trace", "--batch", first, folder / "a.txt", "-o", folder / "out")
-    assert status == 2
+    messages = command.refusal("trace", "--batch", first, folder / "a.txt", "-o", folder / "out")
     assert "first.csv: exists, and is no table of a batch" in messages
     assert first.read_text() == text(0, 100)
     (folder / "there").write_text("")

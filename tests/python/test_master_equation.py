@@ -1,10 +1,8 @@
 """The master equation under a moving slider, against its force curve and against N contacts."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
-from conftest import at_end, long
+from conftest import at_end, drive_in_stages, long
 from mesoslip.errors import ConfigError
 from mesoslip.simulation import realization
 from mesoslip.simulation.audit import failed_checks, step_errors
@@ -14,17 +12,9 @@ from oracles import frozen_law, stationary_force
 from states import entries, reals, saved
 
 FORCE = 18e-6
-REVERSALS = [
-    {"duration": duration, "velocity": velocity}
-    for duration, velocity in (
-        (0.12, 1e-7),
-        (0.05, -1e-7),
-        (0.02, 0.0),
-        (0.1, 2e-7),
-        (0.2, -1.5e-7),
-        (0.1, 1e-7),
-    )
-]
+REVERSALS = drive_in_stages(
+    (0.12, 1e-7), (0.05, -1e-7), (0.02, 0.0), (0.1, 2e-7), (0.2, -1.5e-7), (0.1, 1e-7)
+)
 PRESCRIBED = {"slider": {"kind": "prescribed"}}
 LAYERS = {"mass": 1.47e-3, "stiffness": 97.0, "kind": "layered", "layers": 4}
 
@@ -37,10 +27,17 @@ def dispersion(width, law="gaussian"):
     return {"contacts__threshold": {"law": law, "relative_width": width}}
 
 
+def off_the_curve(config):
+    """Errors of the force in forward sliding without delay, over F_s."""
+    keys = {"run.engine": "me", "contacts.delay": 0.0, "contacts.drag_rate": 0.0}
+    config = config.replace(keys | {"slider": {"kind": "prescribed"}})
+    trace, curve = finish(config).trace, ForceCurve(config)
+    inside = trace[:, 2] < curve.samples[-1]
+    return (trace[inside, 5] - curve.force(trace[inside, 2])) / FORCE
+
+
 def back_and_forth(klein, **changes):
-    return klein(
-        run__duration=None, drive={"stage": REVERSALS}, **PRESCRIBED, **dispersion(0.1), **changes
-    )
+    return klein(run__duration=None, drive=REVERSALS, **PRESCRIBED, **dispersion(0.1), **changes)
 
 
 @pytest.mark.parametrize(
@@ -52,25 +49,12 @@ def back_and_forth(klein, **changes):
 )
 def test_forward_sliding_is_the_force_curve(klein, coupling, initial):
     """Two ways to F(X), and the error falls with the square of the step."""
-    errors = []
-    for resolution in (0.25, 0.125):
-        config = klein(
-            run__engine="me",
-            run__resolution=resolution,
-            run__duration=0.5,
-            contacts__delay=0.0,
-            contacts__drag_rate=0.0,
-            contacts__coupling=coupling,
-            contacts__initial=initial,
-            output__interval=5e-4,
-            **PRESCRIBED,
-            **dispersion(0.1),
-        )
-        trace = finish(config).trace
-        curve = ForceCurve(config)
-        inside = trace[:, 2] < curve.samples[-1]
-        error = trace[inside, 5] - curve.force(trace[inside, 2])
-        errors.append(np.sqrt(np.mean(error**2)) / FORCE)
+    changes = {"contacts__coupling": coupling, "contacts__initial": initial}
+    changes |= {"run__duration": 0.5, "output__interval": 5e-4} | dispersion(0.1)
+    errors = [
+        np.sqrt(np.mean(off_the_curve(klein(**changes, run__resolution=one)) ** 2))
+        for one in (0.25, 0.125)
+    ]
     assert errors[1] < 2e-4
     assert errors[1] < 0.45 * errors[0]
 
@@ -91,25 +75,12 @@ def test_forward_sliding_is_the_force_curve(klein, coupling, initial):
 )
 def test_steps_are_of_second_order(klein, coupling, width, back_force_ratio):
     """The greatest error, however strong the back force is."""
-    errors = []
-    for resolution in (0.25, 0.0625):
-        config = klein(
-            run__engine="me",
-            run__resolution=resolution,
-            run__duration=0.3,
-            contacts__delay=0.0,
-            contacts__drag_rate=0.0,
-            contacts__coupling=coupling,
-            contacts__back_force_ratio=back_force_ratio,
-            output__interval=1e-4,
-            **PRESCRIBED,
-            **dispersion(width),
-        )
-        trace = finish(config).trace
-        curve = ForceCurve(config)
-        inside = trace[:, 2] < curve.samples[-1]
-        error = trace[inside, 5] - curve.force(trace[inside, 2])
-        errors.append(np.max(np.abs(error)) / FORCE)
+    changes = {"contacts__coupling": coupling, "contacts__back_force_ratio": back_force_ratio}
+    changes |= {"run__duration": 0.3, "output__interval": 1e-4} | dispersion(width)
+    errors = [
+        np.max(np.abs(off_the_curve(klein(**changes, run__resolution=one))))
+        for one in (0.25, 0.0625)
+    ]
     assert errors[1] < 2.5e-4
     assert errors[1] < errors[0] / 10
 
@@ -472,7 +443,7 @@ def test_detached_contacts_attach_while_the_slider_rests(klein):
     stages = [(0.07, 2.4e-6), (0.05, 0.0), (0.1, -4e-7)]
     changes = {
         "run__duration": None,
-        "drive": {"stage": [{"duration": time, "velocity": speed} for time, speed in stages]},
+        "drive": drive_in_stages(*stages),
         "contacts__delay": 5e-3,
         "contacts__coupling": "equal",
         "contacts__back_force_ratio": 0.3,
@@ -525,7 +496,7 @@ def test_turning_points_do_not_stall(klein, law, width, delay, coupling, initial
         klein(
             run__engine="me",
             run__duration=None,
-            drive={"stage": [{"duration": time, "velocity": speed} for time, speed in stages]},
+            drive=drive_in_stages(*stages),
             contacts__delay=delay,
             contacts__coupling=coupling,
             contacts__back_force_ratio=0.3,

@@ -1,7 +1,5 @@
 """Interaction as a mean field: lives on a lattice, and the master equation with their tables."""
 
-from __future__ import annotations
-
 import json
 
 import mesoslip

@@ -1,7 +1,5 @@
 """Rates and states of measured traces, against motions of another integrator."""
 
-from __future__ import annotations
-
 import json
 import math
 from dataclasses import replace
@@ -11,21 +9,16 @@ import numpy as np
 import pytest
 import xarray as xr
 from conftest import long
-from mesoslip.analysis import response as responses
 from mesoslip.analysis.experiment_stages import Experiment
-from mesoslip.analysis.rate_and_state import (
-    Loading,
-    Points,
-    RateAndState,
-    fit_laws,
-    fit_rows,
-    points_of_trace,
-    preferred_law,
-    records_of,
-)
+from mesoslip.analysis.rate_and_state.law import RateAndState
 from mesoslip.analysis.rate_and_state.noise import estimated_noise
-from mesoslip.analysis.rate_and_state.rows import _row
-from mesoslip.analysis.response import rows_of, tables
+from mesoslip.analysis.rate_and_state.points import Loading, Points, points_of_trace
+from mesoslip.analysis.rate_and_state.records import records_of
+from mesoslip.analysis.rate_and_state.rows import _row, fit_rows
+from mesoslip.analysis.rate_and_state.search import fit_laws, preferred_law
+from mesoslip.analysis.response import dataset
+from mesoslip.analysis.response.dataset import rows_of
+from mesoslip.analysis.response.tables import tables
 from mesoslip.measured.load_point import drive_stages
 from mesoslip.measured.output_groups import stage_group
 from mesoslip.output import writing
@@ -225,7 +218,7 @@ def test_the_response_of_a_trace_of_coefficients(tmp_path, command, monkeypatch)
         "mesoslip.analysis.rate_and_state.rows.fit_laws",
         lambda record, _: fit_laws(record, ("ageing", "slip")),
     )
-    arrays = responses.response_arrays(path)
+    arrays = dataset.response_arrays(path)
     found = in_xarray(arrays)
     rows = rows_of(found, "rate_and_state")
     assert {one["law"] for one in rows} == {"ageing", "slip"}
@@ -242,7 +235,7 @@ def test_the_response_of_a_trace_of_coefficients(tmp_path, command, monkeypatch)
         "Rate and state",
     }
     # Fits take seconds: the commands print those that were made, and one law is drawn.
-    monkeypatch.setattr(responses, "response_arrays", lambda *_, **__: arrays)
+    monkeypatch.setattr(dataset, "response_arrays", lambda *_, **__: arrays)
     monkeypatch.setattr(measured_response, "fit_laws", partial(fit_laws, laws=("slip",)))
     out = command.output("response", path, "--json")
     slip = next(one for one in json.loads(out)["rate_and_state"] if one["law"] == "slip")

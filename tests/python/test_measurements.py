@@ -1,7 +1,5 @@
 """Files of measurements: every style of a laboratory, units, samples at any times, damages."""
 
-from __future__ import annotations
-
 import gzip
 import tracemalloc
 import zipfile
@@ -571,9 +569,9 @@ def test_matlab_structures_and_hdf5_units(tmp_path):
     np.testing.assert_allclose(record.time, time)
     np.testing.assert_allclose(record.force, 1e-3 * force)
     with h5py.File(tmp_path / "a.h5", "w") as file:
-        file["time"], file["ch1"] = time, (force * 1000).astype("i2")
-        file["time"].attrs["units"] = "seconds since 2020-01-01"
-        file["ch1"].attrs.update(
+        file["run/time"], file["run/ch1"] = time, (force * 1000).astype("i2")
+        file["run/time"].attrs["units"] = "seconds since 2020-01-01"
+        file["run/ch1"].attrs.update(
             {"units": "mN", "scale_factor": 1e-3, "long_name": "shear force", "_FillValue": 0}
         )
         file["other"] = h5py.ExternalLink("secret.h5", "/time")

@@ -1,7 +1,5 @@
 """Methods paragraphs of reports: what they say of a configuration, and their references."""
 
-from __future__ import annotations
-
 import re
 
 import mesoslip

@@ -1,7 +1,5 @@
 """Movies: their frames, what they show, their files, and what a run without them is told."""
 
-from __future__ import annotations
-
 import dataclasses
 import sys
 

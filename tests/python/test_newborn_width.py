@@ -1,14 +1,12 @@
 """Contacts that attach with forces of a normal law."""
 
-from __future__ import annotations
-
 import functools
 
 import mesoslip
 import numpy as np
 import pytest
-from conftest import klein_tables, long
-from mesoslip import Config, ConfigError, SteadySliding
+from conftest import klein_tables, long, problem_of
+from mesoslip import ConfigError, SteadySliding
 from mesoslip.simulation.realization import Realization
 from mesoslip.theory.force_curve import ForceCurve
 from scipy import stats
@@ -150,9 +148,7 @@ def test_without_width_nothing_changes(klein):
 )
 def test_what_is_refused(changes, words):
     tables = klein_tables(**{"contacts__newborn_width": WIDTH} | changes)
-    with pytest.raises(ConfigError) as caught:
-        Config.from_dict(tables)
-    (problem,) = caught.value.problems
+    problem = problem_of(tables)
     assert problem.key == "contacts.newborn_width"
     assert words in problem.message
 

@@ -1,7 +1,5 @@
 """The noise of a trace: each kind as it was put in, on a sawtooth; errors against many draws."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from mesoslip.analysis.even_traces import power_spectrum

@@ -11,7 +11,7 @@ import pytest
 from conftest import at_end
 from kinds import LOAD, VIBRATING, configuration
 from mesoslip import Config, ConfigError, Realization
-from mesoslip.analysis.response import write_csv
+from mesoslip.analysis.response.dataset import write_csv
 from mesoslip.analysis.slips import catalogue_of
 from mesoslip.configuration.load import Load
 from scipy.interpolate import CubicSpline

@@ -1,7 +1,5 @@
 """Notebooks to download: that they have the code of their pages, and that it runs."""
 
-from __future__ import annotations
-
 import json
 import re
 import shlex

@@ -1,7 +1,5 @@
 """The onset of slip against closed forms and scipy's integrator."""
 
-from __future__ import annotations
-
 import mesoslip
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Outputs: one layout in memory and in files, which every method of xarray can handle."""
 
-from __future__ import annotations
-
 import fcntl
 import os
 import platform
@@ -15,7 +13,7 @@ import netCDF4
 import numpy as np
 import pytest
 import xarray as xr
-from conftest import ROOT, klein_tables, long
+from conftest import ROOT, klein_tables, long, python
 from kinds import configuration
 from mesoslip.output import files, filling, targets, writing
 from mesoslip.output.arrays import Arrays
@@ -264,10 +262,7 @@ print((resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024)
 
 def test_a_long_run_is_written_in_little_memory(tmp_path):
     """200 MB of samples take a fixed part of that."""
-    arguments = [str(ROOT / "runs" / "klein.toml"), str(tmp_path / "long.nc")]
-    command = [sys.executable, "-c", MANY, *arguments]
-    printed = subprocess.run(command, check=True, capture_output=True, text=True).stdout
-    assert float(printed) < 100
+    assert float(python(MANY, ROOT / "runs" / "klein.toml", tmp_path / "long.nc")) < 100
     with xr.open_datatree(tmp_path / "long.nc", engine="netcdf4") as tree:
         assert tree["velocity"].values[0, -1] == 1_499_999
         assert tree["slip_traces/sample_time"].values[100_000] == 100_000

@@ -1,11 +1,9 @@
 """Closed forms, conservation, and what a result must not depend on."""
 
-from __future__ import annotations
-
 import mesoslip
 import numpy as np
 import pytest
-from conftest import at_end, long
+from conftest import at_end, drive_in_stages, long
 from mesoslip.configuration.threshold_laws import LAWS as LAWS_BY_NAME
 from mesoslip.simulation.realization import Realization
 from mesoslip.simulation.recorded_tables import ENERGY_COLUMNS
@@ -85,15 +83,7 @@ def test_the_delay_weakens_the_force_with_velocity(klein, law, coupling):
         },
         {"slider": {"kind": "prescribed"}, "run__duration": 1.0},
         {"contacts__threshold": {"law": "exponential", "relative_width": 1.0}},
-        {
-            "drive": {
-                "stage": [
-                    {"duration": 4.0, "velocity": 1e-7},
-                    {"duration": 1.0, "velocity": 0.0},
-                    {"duration": 7.0, "velocity": -2e-7},
-                ]
-            }
-        },
+        {"drive": drive_in_stages((4.0, 1e-7), (1.0, 0.0), (7.0, -2e-7))},
     ],
     ids=["30 s", "one", "two", "strong drag", "million", "prescribed", "exponential", "stages"],
 )

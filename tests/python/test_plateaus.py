@@ -1,14 +1,13 @@
 """Plateaus of speed, load and force: means, errors that know correlation, Stribeck's curve."""
 
-from __future__ import annotations
-
 import json
 import math
 
 import mesoslip
 import numpy as np
 import pytest
-from mesoslip.analysis.plateaus import levels_of, plateaus_of
+from mesoslip.analysis.plateaus.catalogue import plateaus_of
+from mesoslip.analysis.plateaus.levels import levels_of
 from mesoslip.errors import ConfigError, FileError
 from scipy.signal import lfilter
 

@@ -1,7 +1,5 @@
 """Pictures: what they show, what they read, and how they are had without files."""
 
-from __future__ import annotations
-
 import re
 import threading
 
@@ -14,7 +12,7 @@ from commands import FILES, RUNS, SOURCE
 from conftest import ROOT, klein_tables, long
 from kinds import configuration
 from matplotlib.figure import Figure
-from mesoslip.analysis.response import Line
+from mesoslip.analysis.response.line import Line
 from mesoslip.command_line.pictures import summaries
 from mesoslip.configuration.config import Config
 from mesoslip.output import files

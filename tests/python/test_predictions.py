@@ -1,7 +1,5 @@
 """What theory says of the runs of a sweep, as measures."""
 
-from __future__ import annotations
-
 import mesoslip
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """How numbers are written in print."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

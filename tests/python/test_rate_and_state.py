@@ -1,7 +1,5 @@
 """Rate-and-state friction: motions of a spring and slider, and laws fitted to records of runs."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
@@ -9,12 +7,9 @@ import numpy as np
 import pytest
 from conftest import long
 from mesoslip import _core
-from mesoslip.analysis.rate_and_state import (
-    Loading,
-    Points,
-    RateAndState,
-    fit_laws,
-)
+from mesoslip.analysis.rate_and_state.law import RateAndState
+from mesoslip.analysis.rate_and_state.points import Loading, Points
+from mesoslip.analysis.rate_and_state.search import fit_laws
 from oracles import Friction, spring_slider
 from response_coverage import (
     NOISE,

@@ -1,7 +1,5 @@
 """The posterior of rates and states: its density, its draws, its table and its file."""
 
-from __future__ import annotations
-
 import json
 import math
 from dataclasses import replace
@@ -11,16 +9,12 @@ import numpy as np
 import pytest
 from mesoslip import _core
 from mesoslip.analysis.experiment_stages import Experiment
-from mesoslip.analysis.rate_and_state import (
-    Loading,
-    NoiseModel,
-    Points,
-    RateAndState,
-    fit_laws,
-    fit_rows,
-    records_of,
-)
-from mesoslip.analysis.rate_and_state.noise import estimated_noise
+from mesoslip.analysis.rate_and_state.law import RateAndState
+from mesoslip.analysis.rate_and_state.noise import NoiseModel, estimated_noise
+from mesoslip.analysis.rate_and_state.points import Loading, Points
+from mesoslip.analysis.rate_and_state.records import records_of
+from mesoslip.analysis.rate_and_state.rows import fit_rows
+from mesoslip.analysis.rate_and_state.search import fit_laws
 from mesoslip.execution.stop import Stop, StoppedError
 from mesoslip.inference import rate_posterior, rate_tree, sampler
 from mesoslip.inference.rate_posterior import NOISE, Density, RatePosterior, prior_of, sample_laws

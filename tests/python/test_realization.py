@@ -1,7 +1,5 @@
 """One run that goes on as far as one wants."""
 
-from __future__ import annotations
-
 import gc
 import time
 from contextlib import suppress

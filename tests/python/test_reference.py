@@ -1,7 +1,5 @@
 """Outputs against references: a small one for each kind of run, for curves and onsets."""
 
-from __future__ import annotations
-
 import mesoslip
 import numpy as np
 import pytest

@@ -1,41 +1,22 @@
 """The regime of motion: its rules, and runs of every kind."""
 
-from __future__ import annotations
-
 import dataclasses
-import importlib.util
 import json
 import math
-import sys
 
+import marked_motions
 import mesoslip
 import numpy as np
 import pytest
-from conftest import ROOT
-from mesoslip.analysis.regime import (
-    IRREGULAR,
-    NAMES,
-    REGIME,
-    SMOOTH,
-    STICK_SLIP,
-    TRANSIENT,
-    Scales,
-    classify,
-)
+import regimes
+from conftest import drive_in_stages
 from mesoslip.analysis.regime.events import NO_SLIPS, Slips
+from mesoslip.analysis.regime.result import IRREGULAR, NAMES, REGIME, SMOOTH, STICK_SLIP, TRANSIENT
+from mesoslip.analysis.regime.rules import classify
+from mesoslip.analysis.regime.scales import Scales
 from scipy.stats import norm
 
 TIME = np.linspace(0.0, 1.0, 20001)
-
-
-def study(name="regimes"):
-    """The study with the spectral classification, or another one."""
-    path = ROOT / "tests" / "studies" / f"{name}.py"
-    spec = importlib.util.spec_from_file_location(f"{name}_study", path)
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module
 
 
 def sawtooth(periods, falls):
@@ -278,18 +259,16 @@ def test_the_irregular_motion_of_ageing_contacts(klein):
 
 def test_marked_motions():
     """Some of those of the study that an eye has marked, the cheapest of each kind."""
-    module = study("marked_motions")
-    motions = [one for one in module.load() if one["kind"] in {"layers", "lattice", "fast"}]
-    assert len(module.load()) == 140
-    for one in module.classified(motions[1::30]):
+    motions = [one for one in marked_motions.load() if one["kind"] in {"layers", "lattice", "fast"}]
+    assert len(marked_motions.load()) == 140
+    for one in marked_motions.classified(motions[1::30]):
         assert one.regime in one.marks, one.configuration
         assert one.regime in NAMES
 
 
 def test_spectra_say_the_same():
     """At 5 of the 360 points of the study, with other random numbers."""
-    module = study()
-    compared = list(module.compare(module.points()[151::42], first_seed=9000))
+    compared = list(regimes.compare(regimes.points()[151::42], first_seed=9000))
     disagreeing = [one.point for one in compared if one.regime not in one.spectral]
     assert not disagreeing
     assert {SMOOTH, STICK_SLIP} <= {one.regime for one in compared}
@@ -335,18 +314,14 @@ def test_a_slider_without_inertia(klein):
 
 
 def test_the_last_stage_of_a_drive_that_turns_back_is_evaluated(klein):
-    forth = {"duration": 4.0, "velocity": 1e-6}
-    back = {"duration": 4.0, "velocity": -1e-6}
-    rest = {"duration": 1.0, "velocity": 0.0}
+    drive = drive_in_stages((4.0, 1e-6), (4.0, -1e-6), (1.0, 0.0))
     few = {"contacts__count": 500, "contacts__delay": 3e-3, "run__duration": 9.0}
-    found = mesoslip.regime(mesoslip.run(klein(**few, drive={"stage": [forth, back, rest]}))).isel(
-        realization=0
-    )
+    found = mesoslip.regime(mesoslip.run(klein(**few, drive=drive))).isel(realization=0)
     assert found["regime"] == STICK_SLIP
     assert found["window_start"] == pytest.approx(6.0)
     assert found["window_end"] == pytest.approx(8.0)
     alone = mesoslip.regime(
-        mesoslip.run(klein(**few | {"run__duration": 4.0}, drive={"stage": [back]}))
+        mesoslip.run(klein(**few | {"run__duration": 4.0}, drive=drive_in_stages((4.0, -1e-6))))
     ).isel(realization=0)
     assert float(found["period"]) == pytest.approx(float(alone["period"]), rel=0.1)
     assert float(found["stick_share"]) == pytest.approx(float(alone["stick_share"]), abs=0.1)
@@ -368,20 +343,16 @@ def test_the_dataset_is_cf(klein, tmp_path):
 def test_command_and_run_say_the_same(klein, tmp_path, command):
     config, output = tmp_path / "few.toml", tmp_path / "few.nc"
     config.write_text(klein(contacts__count=300).to_toml())
-    status, _, said = command("run", str(config), "-o", str(output))
-    assert status == 0
+    said = command.messages("run", str(config), "-o", str(output))
     printed = command.output("regime", str(output))
     assert f"{output}: {printed.splitlines()[-1]}" in said
-    status, printed, _ = command("regime", str(output), "--json")
-    rows = json.loads(printed)
+    rows = json.loads(command.output("regime", str(output), "--json"))
     assert [one["realization"] for one in rows] == [0]
     data = mesoslip.regime(output)
     assert rows[0]["cycles"] == int(data["cycles"][0])
-    status, _, said = command("run", str(config), "-o", str(output), "--set", "run.realizations=3")
-    assert status == 0
-    assert (
-        sum(int(part.split()[0]) for part in said.splitlines()[-1].split(": ")[1].split(", ")) == 3
-    )
+    said = command.messages("run", str(config), "-o", str(output), "--set", "run.realizations=3")
+    counts = said.splitlines()[-1].split(": ")[1].split(", ")
+    assert sum(int(one.split()[0]) for one in counts) == 3
     curve = tmp_path / "curve.nc"
     wide = ("--set", "contacts.threshold.relative_width=0.1")
     assert command("curve", str(config), "-o", str(curve), *wide)[0] == 0

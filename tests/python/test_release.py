@@ -1,14 +1,11 @@
 """The tools of a release: they find what is wrong, and change all files or none."""
 
-from __future__ import annotations
-
 import shutil
-import subprocess
 import sys
 import tomllib
 
 import pytest
-from conftest import ROOT
+from conftest import ROOT, run_program
 
 FILES = [
     *("pyproject.toml", "uv.lock", "CITATION.cff", "codemeta.json", "CHANGELOG.md"),
@@ -32,14 +29,9 @@ def tree(tmp_path):
 
 
 def call(tree, tool, *arguments):
-    done = subprocess.run(
-        [sys.executable, ROOT / "tools" / tool, *arguments],
-        cwd=tree,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    return done.returncode, done.stdout + done.stderr
+    line = (sys.executable, ROOT / "tools" / tool, *arguments)
+    status, printed, errors = run_program(*line, cwd=tree)
+    return status, printed + errors
 
 
 def test_a_version_is_set_everywhere_or_nowhere(tree):

@@ -1,7 +1,5 @@
 """Reports: all that an output holds on a page that needs nothing else."""
 
-from __future__ import annotations
-
 import html
 import re
 from html.parser import HTMLParser
@@ -12,7 +10,7 @@ import pytest
 import xarray as xr
 from conftest import ROOT, klein_tables, long
 from kinds import DIFFERENT, KINDS, configuration
-from mesoslip.analysis.rate_and_state import fit_laws
+from mesoslip.analysis.rate_and_state.search import fit_laws
 from mesoslip.output.kinds import KINDS as OUTPUTS
 from mesoslip.plots.views.run import caption
 from mesoslip.quantities import column

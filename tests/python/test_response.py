@@ -1,7 +1,5 @@
 """Steady forces, velocity steps and holds of records whose laws are known."""
 
-from __future__ import annotations
-
 import csv
 import json
 import math
@@ -12,11 +10,14 @@ import numpy as np
 import pytest
 import tomli_w
 import xarray as xr
-from conftest import ROOT, klein_tables
+from conftest import ROOT, drive_in_stages, klein_tables
 from matplotlib.figure import Figure
 from mesoslip import Config, FileError
-from mesoslip.analysis.rate_and_state import Loading, fit_laws
-from mesoslip.analysis.response import force_scale, line, rows_of, scalars_of, tables
+from mesoslip.analysis.rate_and_state.points import Loading
+from mesoslip.analysis.rate_and_state.search import fit_laws
+from mesoslip.analysis.response.dataset import rows_of, scalars_of
+from mesoslip.analysis.response.line import line
+from mesoslip.analysis.response.tables import force_scale, tables
 from mesoslip.analysis.steady_force import steady_mean, transient
 from mesoslip.theory.steady_sliding import sliding_of
 from oracles import Friction, spring_slider
@@ -289,7 +290,7 @@ def sliding():
         contacts__back_force_ratio=0.0,
         contacts__count=400,
         contacts__threshold={"law": "uniform", "relative_width": 0.3},
-        drive={"stage": [{"duration": 2.0, "velocity": 1e-7}, {"duration": 0.4, "velocity": 5e-7}]},
+        drive=drive_in_stages((2.0, 1e-7), (0.4, 5e-7)),
         run={"duration": 2.4, "realizations": 4},
         output={"interval": 1e-3},
     )
@@ -360,13 +361,7 @@ def test_stick_slip_is_stated_and_not_fitted():
     tree = mesoslip.run(
         klein_tables(
             contacts__count=200,
-            drive={
-                "stage": [
-                    {"duration": 3.0, "velocity": 1e-7},
-                    {"duration": 0.5, "velocity": 0.0},
-                    {"duration": 3.0, "velocity": 1e-7},
-                ]
-            },
+            drive=drive_in_stages((3.0, 1e-7), (0.5, 0.0), (3.0, 1e-7)),
             run={"duration": 6.5},
         )
     )
@@ -392,14 +387,7 @@ def test_the_command(tmp_path, command, monkeypatch):
     tables = klein_tables(
         contacts__count=50,
         slider={"kind": "prescribed"},
-        drive={
-            "stage": [
-                {"duration": 0.3, "velocity": 1e-6},
-                {"duration": 0.1, "velocity": 0.0},
-                {"duration": 0.3, "velocity": 1e-6},
-                {"duration": 0.1, "velocity": 3e-6},
-            ]
-        },
+        drive=drive_in_stages((0.3, 1e-6), (0.1, 0.0), (0.3, 1e-6), (0.1, 3e-6)),
         run={"duration": 0.8},
     )
     (tmp_path / "run.toml").write_text(tomli_w.dumps(tables))

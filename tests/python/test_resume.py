@@ -1,7 +1,5 @@
 """Runs that are stopped and taken up again are the same to the bit."""
 
-from __future__ import annotations
-
 import errno
 import gc
 import json
@@ -18,7 +16,7 @@ import numpy as np
 import pytest
 import tomli_w
 import xarray as xr
-from conftest import at_end, klein_tables, long
+from conftest import at_end, drive_in_stages, klein_tables, long
 from invariants import differences
 from kinds import COARSE, KINDS, RANDOM, THERMAL, configuration, pairwise
 from mesoslip import Config, FileError, RunError
@@ -36,15 +34,7 @@ ONCE = {}
 
 
 # For master equations, whose runs take most of the time: one slip and a reversal.
-SHORT = {
-    "drive": {
-        "stage": [
-            {"duration": 0.025, "velocity": 1e-5},
-            {"duration": 0.002, "velocity": 0.0},
-            {"duration": 0.025, "velocity": -1e-5},
-        ]
-    }
-}
+SHORT = {"drive": drive_in_stages((0.025, 1e-5), (0.002, 0.0), (0.025, -1e-5))}
 
 
 def short_configuration(kind: str) -> Config:
@@ -711,6 +701,5 @@ def test_ctrl_c_reports_how_to_go_on(long_run, tmp_path, command):
     assert "--resume" in again.stderr.readline()
     again.kill()
     again.communicate()
-    status, _, printed = command("run", long_run, "-o", output, "--resume")
-    assert status == 0, printed
+    printed = command.messages("run", long_run, "-o", output, "--resume")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["long.toml", "stopped.nc"]

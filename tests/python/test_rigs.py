@@ -1,12 +1,10 @@
 """The examples of measured files: the numbers of the page "From your rig to a table"."""
 
-from __future__ import annotations
-
 import mesoslip
 import numpy as np
 import pytest
 from conftest import ROOT
-from mesoslip.analysis.strokes import strokes_of
+from mesoslip.analysis.strokes.catalogue import strokes_of
 
 MEASURED = ROOT / "runs" / "measured"
 

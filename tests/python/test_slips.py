@@ -1,14 +1,12 @@
 """The catalogue of slips: what a person would mark in the trace, and nothing else."""
 
-from __future__ import annotations
-
 import csv
 import json
 
 import mesoslip
 import numpy as np
 import pytest
-from conftest import long
+from conftest import drive_in_stages, long
 
 STATIC_FORCE = 18e-6
 STIFF = {"slider__stiffness": 2000.0, "contacts__delay": 0.0}
@@ -190,12 +188,8 @@ def test_ringing_about_fast_smooth_sliding_is_no_slip(klein, velocity, damping_r
     assert catalogue(tree).sizes["slip"] == 0
 
 
-def stages(*pairs: tuple[float, float]) -> dict[str, object]:
-    return {"stage": [{"duration": time, "velocity": speed} for time, speed in pairs]}
-
-
 def test_steps_of_smooth_sliding_are_no_slips(klein):
-    drive = stages((0.3, 1e-6), (0.3, 1e-5), (0.3, 2e-5), (0.3, 1e-5))
+    drive = drive_in_stages((0.3, 1e-6), (0.3, 1e-5), (0.3, 2e-5), (0.3, 1e-5))
     tree = mesoslip.run(
         klein(
             run__duration=None,
@@ -216,7 +210,7 @@ def test_no_slip_crosses_a_stage(klein, slider):
     changes = {} if slider is None else {"slider": slider}
     alone = catalogue(mesoslip.run(klein(drive__velocity=1e-6, run__duration=0.5, **changes)))
     middle = float((alone["start_time"][0] + alone["end_time"][0]) / 2)
-    drive = stages((middle, 1e-6), (0.5, -1e-6), (0.3, 0.0), (1.0, 2e-6), (1.0, -5e-7))
+    drive = drive_in_stages((middle, 1e-6), (0.5, -1e-6), (0.3, 0.0), (1.0, 2e-6), (1.0, -5e-7))
     tree = mesoslip.run(klein(run__duration=None, drive=drive, **changes))
     slips = catalogue(tree)
     ends = np.cumsum([0, middle, 0.5, 0.3, 1.0, 1.0])

@@ -1,7 +1,5 @@
 """The script for SLURM of the documentation, with stand-ins for its commands."""
 
-from __future__ import annotations
-
 import os
 import re
 import shutil

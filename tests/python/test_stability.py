@@ -1,7 +1,5 @@
 """Linear stability of steady sliding of contacts that age or break by thermal activation."""
 
-from __future__ import annotations
-
 import math
 
 import mesoslip

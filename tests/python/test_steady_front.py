@@ -1,7 +1,5 @@
 """Steady fronts along a row of blocks: closed forms, a plain chain, and runs."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from typing import Any

@@ -1,17 +1,14 @@
 """Linear stability of steady sliding with delay, against independent formulas and runs."""
 
-from __future__ import annotations
-
-import importlib.util
 import math
-import sys
 
 import mesoslip
 import numpy as np
 import pytest
-from conftest import ROOT, long
+import steady_sliding
+from conftest import long
 from mesoslip import ConfigError, SteadySliding
-from mesoslip.analysis.regime import STICK_SLIP
+from mesoslip.analysis.regime.result import STICK_SLIP
 from mesoslip.quantities import with_unit
 from mesoslip.theory.force_curve import ForceCurve
 from mesoslip.theory.lives import newborn_stretch, scales
@@ -20,16 +17,6 @@ from mesoslip.theory.steady_sliding import stability_boundary, stable_stiffness
 from scipy import special
 
 pytestmark = pytest.mark.usefixtures("no_step_errors")
-
-
-def study():
-    """The study with runs of the engine."""
-    path = ROOT / "tests" / "studies" / "steady_sliding.py"
-    spec = importlib.util.spec_from_file_location("steady_sliding_study", path)
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module
 
 
 def linearized(config, rate):
@@ -178,15 +165,16 @@ NEWBORN = {
 )
 def test_engine_answers_as_reported(contacts, bound):
     """With newborn contacts of different forces it is another answer, by a tenth."""
-    module = study()
-    config = module.tables(contacts=contacts)
+    config = steady_sliding.tables(contacts=contacts)
     sliding = SteadySliding(
         mesoslip.Config.from_dict(
             {**config, "run": {"engine": "me", "duration": 1.0}, "drive": {"velocity": 1e-6}}
         )
     )
     periods = 4 if contacts is NEWBORN else 8
-    found = module.shaken_response(1e-6, 600.0, 1e-10, 0.1, periods=periods, contacts=contacts)
+    found = steady_sliding.shaken_response(
+        1e-6, 600.0, 1e-10, 0.1, periods=periods, contacts=contacts
+    )
     assert found == pytest.approx(complex(sliding.response(600.0)), rel=bound)
 
 

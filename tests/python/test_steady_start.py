@@ -1,7 +1,5 @@
 """Starts in the stationary state of slow sliding, against the weighted laws by scipy."""
 
-from __future__ import annotations
-
 import time
 
 import numpy as np

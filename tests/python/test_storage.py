@@ -1,7 +1,5 @@
 """Outputs that are locked, of a newer version, or where the file system has no locks."""
 
-from __future__ import annotations
-
 import errno
 import fcntl
 import shutil

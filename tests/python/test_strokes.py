@@ -1,7 +1,5 @@
 """Records that go back and forth: strokes, and slips between reversals."""
 
-from __future__ import annotations
-
 import json
 import math
 
@@ -11,18 +9,14 @@ import pytest
 import tomli_w
 import xarray as xr
 from conftest import long
-from mesoslip.analysis.strokes import (
-    find_slips_between_reversals,
-    found_period,
-    friction_map,
-    monotone_pieces,
-    pieces_of_force,
-    record_pieces,
-    sliding_of,
-    strokes_of,
-)
+from mesoslip.analysis.strokes.catalogue import strokes_of
 from mesoslip.analysis.strokes.cycles import overall
+from mesoslip.analysis.strokes.friction_map import friction_map
 from mesoslip.analysis.strokes.measure import Measured
+from mesoslip.analysis.strokes.revolutions import found_period
+from mesoslip.analysis.strokes.segments import monotone_pieces, pieces_of_force, record_pieces
+from mesoslip.analysis.strokes.sliding import sliding_of
+from mesoslip.analysis.strokes.slips import find_slips_between_reversals
 from mesoslip.reports.content import Subject
 from mesoslip.reports.sections.catalogues import strokes as report_section
 from numpy.typing import NDArray

@@ -6,7 +6,6 @@ import ast
 import os
 import re
 import shutil
-import subprocess
 import sys
 from pathlib import Path
 
@@ -14,7 +13,7 @@ import mesoslip
 import mutants
 import numpy as np
 import pytest
-from conftest import ROOT
+from conftest import ROOT, run_program
 from kinds import KINDS as RUNS
 from kinds import configuration
 from mesoslip.configuration import contacts
@@ -202,12 +201,12 @@ def test_fortran_states_are_not_saved():
         assert not re.search(r"^\s*save\b|,\s*save\b", text, re.MULTILINE), path
 
 
+IMPORT_LINTER = Path(sys.executable).with_name("lint-imports")
+
+
 def test_python_imports_point_one_way():
-    program = Path(sys.executable).with_name("lint-imports")
-    result = subprocess.run(
-        [program, "--no-cache"], cwd=ROOT, capture_output=True, text=True, check=False
-    )
-    assert result.returncode == 0, result.stdout
+    status, printed, _ = run_program(IMPORT_LINTER, "--no-cache", cwd=ROOT)
+    assert status == 0, printed
 
 
 # A line that asks whether contacts have a feature: by its table, or by the name of that.
@@ -353,18 +352,12 @@ def test_wrong_imports_of_python_are_found(tmp_path):
     shutil.copytree(Path(mesoslip.__file__).parent, package)
     for room, module in PLANTS.items():
         (package / room / "planted.py").write_text(f"import mesoslip.{module}\n")
-    program = Path(sys.executable).with_name("lint-imports")
-    result = subprocess.run(
-        [program, "--no-cache", "--config", ROOT / "pyproject.toml"],
-        cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": str(tmp_path)},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert result.returncode == 1
+    line = (IMPORT_LINTER, "--no-cache", "--config", ROOT / "pyproject.toml")
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
+    status, printed, _ = run_program(*line, cwd=tmp_path, env=environment)
+    assert status == 1
     for room, module in PLANTS.items():
-        assert f"mesoslip.{room}.planted -> mesoslip.{module}" in result.stdout, room
+        assert f"mesoslip.{room}.planted -> mesoslip.{module}" in printed, room
 
 
 def test_mutants_are_of_these_sources():

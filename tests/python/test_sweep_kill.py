@@ -1,7 +1,5 @@
 """Sweeps that are killed, stopped, or meet a disk that fails: nothing is lost."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import signal
@@ -179,8 +177,7 @@ def test_a_full_disk_keeps_earlier_points(small_disk, sweep_file, command):
     assert not list(small_disk.rglob(".*"))
     remount = ["mount", "-o", "remount,size=4m", str(small_disk)]
     subprocess.run(remount, check=True)
-    status, _, printed = command("sweep", path, "-o", output, "--pool", "threads")
-    assert status == 0
+    printed = command.messages("sweep", path, "-o", output, "--pool", "threads")
     assert f"{100 - len(kept)} points computed, {len(kept)} read from the store" in printed
 
 

@@ -1,13 +1,11 @@
 """Threshold laws of a table, such as measured areas of contacts."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import mesoslip
 import numpy as np
 import pytest
-from conftest import klein_tables, long
+from conftest import klein_tables, long, problem_of
 from mesoslip import Config, ConfigError, ThresholdLaw
 from mesoslip.theory.contacts import contact_theory
 from mesoslip.theory.contacts.plain_sliding import SteadySliding
@@ -180,9 +178,8 @@ def test_a_file_and_what_an_output_keeps(tmp_path):
 def test_what_is_wrong_with_a_file_is_reported_once(tmp_path, text, words):
     path = tmp_path / "areas.csv"
     path.write_text(text)
-    with pytest.raises(ConfigError) as caught:
-        Config.from_dict(klein_tables(contacts__threshold={"law": "table", "file": str(path)}))
-    (problem,) = caught.value.problems
+    threshold = {"law": "table", "file": str(path)}
+    problem = problem_of(klein_tables(contacts__threshold=threshold))
     assert problem.key == "contacts.threshold.file"
     assert words in problem.message
 
@@ -200,9 +197,7 @@ def test_what_is_wrong_with_a_file_is_reported_once(tmp_path, text, words):
     ],
 )
 def test_what_is_wrong_with_the_keys(threshold, key, words):
-    with pytest.raises(ConfigError) as caught:
-        Config.from_dict(klein_tables(contacts__threshold=threshold))
-    (problem,) = caught.value.problems
+    problem = problem_of(klein_tables(contacts__threshold=threshold))
     assert problem.key == f"contacts.threshold.{key}"
     assert words in problem.message
 

@@ -1,11 +1,9 @@
 """Threshold tables with a stiffness for each threshold."""
 
-from __future__ import annotations
-
 import mesoslip
 import numpy as np
 import pytest
-from conftest import klein_tables, long
+from conftest import drive_in_stages, klein_tables, long, problem_of
 from mesoslip import Config, ConfigError
 from mesoslip.configuration.threshold_laws.table import stretch_cells
 from mesoslip.theory.contacts.plain_sliding import SteadySliding
@@ -26,13 +24,7 @@ FORWARD = {"run__drive_displacement": 5e-8}
 # Far enough back that contacts break there, and forward again.
 BACK_AND_FORTH = {
     "run__duration": 0.013,
-    "drive": {
-        "stage": [
-            {"duration": 0.005, "velocity": 4e-6},
-            {"duration": 0.004, "velocity": -6e-6},
-            {"duration": 0.004, "velocity": 5e-6},
-        ]
-    },
+    "drive": drive_in_stages((0.005, 4e-6), (0.004, -6e-6), (0.004, 5e-6)),
 }
 RANDOM = np.random.default_rng(3)
 THRESHOLDS = RANDOM.uniform(0.5, 1.5, 200)
@@ -294,9 +286,7 @@ def test_what_is_wrong_with_a_file(tmp_path, text, words):
     path = tmp_path / "rows.csv"
     path.write_text(text)
     tables = klein_tables(contacts__threshold={"law": "table", "file": str(path)})
-    with pytest.raises(ConfigError) as caught:
-        Config.from_dict(tables)
-    (problem,) = caught.value.problems
+    problem = problem_of(tables)
     assert problem.key == "contacts.threshold.file"
     assert words in problem.message
 
@@ -332,8 +322,6 @@ EVEN = table([1, 2], [1, 1])
     ],
 )
 def test_what_is_wrong_with_the_keys(changes, key, words):
-    with pytest.raises(ConfigError) as caught:
-        Config.from_dict(klein_tables(**{"contacts__coupling": "table"} | changes))
-    (problem,) = caught.value.problems
+    problem = problem_of(klein_tables(**{"contacts__coupling": "table"} | changes))
     assert problem.key == f"contacts.{key}"
     assert words in problem.message

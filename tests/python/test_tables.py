@@ -1,7 +1,5 @@
 """Tables as files: one writer for values in SI, Markdown and LaTeX."""
 
-from __future__ import annotations
-
 import csv
 
 import mesoslip

@@ -1,19 +1,17 @@
 """Thermally activated breaking: closed forms, a fixed step, limits, configuration."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
 import mesoslip
 import numpy as np
 import pytest
-from conftest import at_end, long
+from conftest import at_end, changed, drive_in_stages, long
 from kinds import configuration
 from mesoslip import Config, ConfigError
 from mesoslip.simulation.realization import Realization
 from mesoslip.theory.contacts import contact_theory
-from oracles import aged, fixed_step, frozen_law, uniforms
+from oracles import aged, assert_same_events, fixed_step, frozen_law, uniforms
 from scipy import integrate, special
 from test_events import breaks
 
@@ -34,16 +32,7 @@ def unit_tables(count: int = 1000, **changes: Any) -> dict[str, Any]:
         },
         "output": {"interval": 1.0},
     }
-    for path, value in changes.items():
-        *outer, key = path.split("__")
-        table = tables
-        for name in outer:
-            table = table.setdefault(name, {})
-        if value is None:
-            table.pop(key, None)
-        else:
-            table[key] = value
-    return tables
+    return changed(tables, **changes)
 
 
 def unit(count: int = 1000, **changes: Any) -> Config:
@@ -151,10 +140,7 @@ def test_breaks_come_where_their_deviates_say(ratio, direction):
     expected = sorted(one for one in expected if one[0] < 400)
     actual = breaks(config)
     assert len(expected) == len(actual) > 320
-    assert [contact for _, contact in actual] == [contact for _, contact in expected]
-    np.testing.assert_allclose(
-        [time for time, _ in actual], [time for time, _ in expected], rtol=1e-12
-    )
+    assert_same_events(actual, expected, rtol=1e-12)
 
 
 @pytest.mark.parametrize("ratio", [2e-3, 0.05, 1.0])
@@ -183,10 +169,7 @@ def test_uniform_motion_breaks_contacts_where_clocks_do(ratio, changes):
         )
     uniform, clocked = runs
     assert len(uniform) == len(clocked) > 500
-    assert [contact for _, contact in uniform] == [contact for _, contact in clocked]
-    np.testing.assert_allclose(
-        [time for time, _ in uniform], [time for time, _ in clocked], rtol=1e-10
-    )
+    assert_same_events(uniform, clocked, rtol=1e-10)
 
 
 def relaxing(force_ratio: float, width: float) -> dict[str, Any]:
@@ -224,10 +207,7 @@ def test_uniform_motion_breaks_ageing_contacts_where_clocks_do(ageing, ratio, de
         for end in (0.3, 0.3 * (1.0 + 1e-13))
     )
     assert len(uniform) == len(clocked) > 60
-    assert [contact for _, contact in uniform] == [contact for _, contact in clocked]
-    np.testing.assert_allclose(
-        [time for time, _ in uniform], [time for time, _ in clocked], rtol=1e-9
-    )
+    assert_same_events(uniform, clocked)
 
 
 @pytest.mark.parametrize(
@@ -353,7 +333,7 @@ def test_a_hold_of_a_million_seconds():
     config = unit(
         count,
         run__duration=None,
-        drive={"stage": [{"duration": 1e3, "velocity": 1e-2}, {"duration": 1e6, "velocity": 0.0}]},
+        drive=drive_in_stages((1e3, 1e-2), (1e6, 0.0)),
         contacts__threshold__relative_width=0.3,
         output__interval=100.0,
     )
@@ -371,7 +351,7 @@ def test_a_long_hold_of_a_rigid_slider(klein):
     """A slider that settles between two breaks goes from one to the next in one step."""
     config = klein(
         run__duration=None,
-        drive={"stage": [{"duration": 2.0, "velocity": 1e-7}, {"duration": 1e6, "velocity": 0.0}]},
+        drive=drive_in_stages((2.0, 1e-7), (1e6, 0.0)),
         contacts__count=20,
         contacts__coupling="equal",
         contacts__threshold__relative_width=0.1,
@@ -390,13 +370,7 @@ def test_a_rigid_slider_moves_on_after_a_long_hold(klein):
     """It starts in balance but for rounding, which the drive outweighs before the time can grow."""
     config = klein(
         run__duration=None,
-        drive={
-            "stage": [
-                {"duration": 0.2, "velocity": -1e-6},
-                {"duration": 1e6, "velocity": 0.0},
-                {"duration": 0.2, "velocity": 1e-6},
-            ]
-        },
+        drive=drive_in_stages((0.2, -1e-6), (1e6, 0.0), (0.2, 1e-6)),
         contacts__count=500,
         contacts__coupling="equal",
         contacts__delay_law="exponential",
@@ -433,11 +407,7 @@ def test_without_temperature_it_is_the_model_without(kind, rate, force_ratio):
     warm = Config.from_dict(tables | {"contacts": tables["contacts"] | thermal})
     expected, actual = breaks(cold), breaks(warm)
     assert len(expected) == len(actual)
-    first = 300
-    assert [one for _, one in actual[:first]] == [one for _, one in expected[:first]]
-    np.testing.assert_allclose(
-        [time for time, _ in actual[:first]], [time for time, _ in expected[:first]], rtol=1e-9
-    )
+    assert_same_events(actual, expected, 300)
 
 
 @pytest.mark.parametrize("seed", [2, 44, 61])
@@ -461,7 +431,7 @@ def test_contacts_reach_their_thresholds_after_a_reversal(seed):
     thermal = {"rate": 1e-17, "force_ratio": 2.0}
     warm = tables | {"contacts": tables["contacts"] | {"thermal": thermal}}
     cold = tables | {"contacts": tables["contacts"] | {"thermal": None}}
-    actual, expected = (mesoslip.run(Config.from_dict(one))["energy"] for one in (warm, cold))
+    actual, expected = (mesoslip.run(one)["energy"] for one in (warm, cold))
     for term in ("drive_work", "break_loss"):
         assert float(actual[term].values[0]) == pytest.approx(
             float(expected[term].values[0]), rel=1e-12
@@ -474,13 +444,7 @@ def test_contacts_reach_their_thresholds_after_a_reversal(seed):
         long({"run__duration": 0.02, "drive__velocity": 1e-5}),
         {
             "run__duration": None,
-            "drive": {
-                "stage": [
-                    {"duration": 0.025, "velocity": 1e-5},
-                    {"duration": 0.005, "velocity": 0.0},
-                    {"duration": 0.04, "velocity": -1e-5},
-                ]
-            },
+            "drive": drive_in_stages((0.025, 1e-5), (0.005, 0.0), (0.04, -1e-5)),
             "contacts__back_force_ratio": 0.0,
         },
     ],

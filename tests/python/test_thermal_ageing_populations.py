@@ -1,13 +1,11 @@
 """Infinitely many contacts that age and break by thermal activation: closed forms and limits."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
 import numpy as np
 import pytest
-from conftest import at_end, long
+from conftest import at_end, drive_in_stages, long
 from kinds import RELAX, configuration
 from mesoslip import Config, Realization
 from mesoslip.theory.contacts import contact_theory
@@ -93,14 +91,7 @@ def test_steps_of_a_hold_are_not_as_short_as_the_delay(delay):
     config = Config.from_dict(
         {
             "run": {"engine": "me"},
-            "drive": {
-                "stage": [
-                    {"duration": 3.0, "velocity": 1.0},
-                    {"duration": 1.0, "velocity": 0.0},
-                    {"duration": 2.0, "velocity": -1.0},
-                    {"duration": 1.0, "velocity": 0.0},
-                ]
-            },
+            "drive": drive_in_stages((3.0, 1.0), (1.0, 0.0), (2.0, -1.0), (1.0, 0.0)),
             "slider": {"kind": "rigid", "mass": 0.01, "stiffness": 0.5, "damping_ratio": 0.3},
             "contacts": {
                 "count": 300,

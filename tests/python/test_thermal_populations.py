@@ -1,7 +1,5 @@
 """Thermally activated breaking of infinitely many contacts: closed forms, order, limits."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Records that are thinned on reading, block by block."""
 
-from __future__ import annotations
-
 import gzip
 
 import h5py

@@ -1,7 +1,5 @@
 """Strength along the track of the slider (model section 18)."""
 
-from __future__ import annotations
-
 import math
 
 import mesoslip

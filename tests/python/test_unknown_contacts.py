@@ -4,15 +4,12 @@ The key `contacts.softening` is planted into the configuration of a program of i
 answer for it has to say so: kinds of the kernel, theories, reports.
 """
 
-from __future__ import annotations
-
 import json
 import os
-import subprocess
 import sys
 
 import pytest
-from conftest import ROOT
+from conftest import ROOT, run_program
 
 # A key that is in the configuration alone; with KIND, contacts of one engine that say they know it.
 PLANT = """
@@ -37,18 +34,14 @@ config = mesoslip.Config.load(RUN, ["contacts.softening=0.5", "run.duration=1 s"
 """
 
 
-def outcome(program: str, *, kind: bool) -> str:
+def outcome(code: str, *, kind: bool) -> str:
     """The last line of what a program with the planted key prints, errors included."""
     run = str(ROOT / "runs" / "klein.toml")
     start = f"KIND, RUN = {kind}, {run!r}"
-    done = subprocess.run(
-        [sys.executable, "-c", start + PLANT + program],
-        capture_output=True,
-        text=True,
-        check=False,
-        env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
-    )
-    return (done.stderr or done.stdout).strip().splitlines()[-1]
+    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
+    line = (sys.executable, "-c", start + PLANT + code)
+    _, printed, errors = run_program(*line, env=environment)
+    return (errors or printed).strip().splitlines()[-1]
 
 
 def test_a_key_without_a_kind_is_an_error_of_the_configuration():

@@ -11,8 +11,6 @@ Prints a line for each kind; exit status 0 if nothing was wrong. A short version
 tests/python/test_resume.py, and tests/resume/kill_all.py kills sweeps and fits as well.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import sys

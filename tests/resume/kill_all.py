@@ -4,8 +4,6 @@ Usage: kill_all.py [KILLS] [--scale FACTOR] [--tally FILE]. A quarter of the kil
 kill.py, kill_sweep.py and kill_fit.py for what is checked. Exit status 0 if nothing was wrong.
 """
 
-from __future__ import annotations
-
 import os
 
 import kill

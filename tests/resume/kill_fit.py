@@ -9,8 +9,6 @@ Usage: kill_fit.py [KILLS] [--tally FILE]. Of each fit it is checked that
 Exit status 0 if nothing was wrong. A short version is in tests/python/test_fit_kill.py.
 """
 
-from __future__ import annotations
-
 import os
 import sys
 import tempfile

@@ -13,8 +13,6 @@ Prints what was found; exit status 0 if nothing was wrong. A short version is in
 tests/python/test_sweep_kill.py.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import signal

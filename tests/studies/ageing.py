@@ -7,8 +7,6 @@ Three tables, which stand in ``docs/ageing.md``::
     .venv/bin/python tests/studies/ageing.py steady
 """
 
-from __future__ import annotations
-
 import math
 import sys
 from pathlib import Path

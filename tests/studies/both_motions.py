@@ -4,8 +4,6 @@ over the velocity, beside linear theory: ``docs/both-motions.png``; a minute.
     .venv/bin/python tests/studies/both_motions.py [figure]
 """
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

@@ -9,8 +9,6 @@ the error that `mesoslip.cycle` reports, the modulus of the leading multiplier, 
 time over that of a run of 100 periods; then the median of these ratios.
 """
 
-from __future__ import annotations
-
 import math
 import sys
 import time

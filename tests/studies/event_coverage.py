@@ -3,14 +3,12 @@
 python tests/studies/event_coverage.py [COUNT]
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 import sys
 
 import numpy as np
-from mesoslip.analysis.events import b_value, omori
+from mesoslip.analysis.events.laws import b_value, omori
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]

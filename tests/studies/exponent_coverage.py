@@ -7,8 +7,6 @@ Prints the tables of ``docs/exponents.md``::
     .venv/bin/python tests/studies/exponent_coverage.py [samples]
 """
 
-from __future__ import annotations
-
 import math
 import sys
 from collections.abc import Callable

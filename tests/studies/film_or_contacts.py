@@ -8,8 +8,6 @@ a trace::
     .venv/bin/python tests/studies/film_or_contacts.py [TRUTH ...]
 """
 
-from __future__ import annotations
-
 import sys
 import time
 from pathlib import Path

@@ -16,8 +16,6 @@ two records of contacts on tracks, with springs of 97 and 160 N/m and a level ea
     python tests/studies/fit_calibration.py out/levels.csv --case levels --experiments 30
 """
 
-from __future__ import annotations
-
 import argparse
 import csv
 import time

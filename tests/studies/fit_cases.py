@@ -5,8 +5,6 @@ Prints the tables of ``docs/fit-accuracy.md``; some minutes of a processor a cas
     python tests/studies/fit_cases.py hidden smooth rate_and_state mass
 """
 
-from __future__ import annotations
-
 import sys
 import time
 from collections.abc import Callable

@@ -3,8 +3,6 @@
 Needs out/docs/front-types.nc, the sweep of runs/maps/front-types.toml.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import matplotlib.pyplot as plt

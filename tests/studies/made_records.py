@@ -11,8 +11,6 @@ same. The rule was written with the records of which `is_for_design` is true, ha
 prints recall and precision by kind, and by force drop over noise, of both halves.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 import sys
@@ -24,6 +22,7 @@ from pathlib import Path
 
 import mesoslip
 import numpy as np
+from mesoslip import Config
 from mesoslip.analysis.alternating_extremes import extremes_of
 from mesoslip.analysis.sampled_slips import find_slips
 from numpy.typing import NDArray
@@ -37,24 +36,10 @@ NUMBER = 300
 MAX_SAMPLES = 100_000
 # Edges of the classes of force drop over noise.
 CLASSES = (0, 2, 3, 5, 8, 12, 20, 50, math.inf)
-KLEIN = {
-    "run": {"duration": 40.0},
-    "drive": {"velocity": 1e-7},
-    "slider": {"mass": 1.47e-3, "stiffness": 97.0, "damping_ratio": 0.2},
-    "contacts": {
-        "count": 400,
-        "area": 1e-10,
-        "film_thickness": 3.5e-9,
-        "film_density": 956.0,
-        "static_force": 18e-6,
-        "stiffness": 2000.0,
-        "drag_rate": 2e11,
-        "back_force_ratio": 0.1,
-        "delay": 5e-4,
-        "threshold": {"law": "gaussian", "relative_width": 0.01},
-    },
-    "output": {"interval": 1e-3},
-}
+KLEIN = Config.load(
+    Path(__file__).parents[2] / "runs" / "klein.toml",
+    ["run.duration=40 s", "contacts.count=400", "output.slip_interval=none"],
+)
 IRREGULAR = {
     "slider.damping_ratio": 0.02,
     "slider.stiffness": 75.9,
@@ -202,21 +187,9 @@ def _with_noise(
     return whole, deviation, delay
 
 
-def _nested(changes: dict[str, object]) -> dict[str, object]:
-    tables = {name: {**table} for name, table in KLEIN.items()}
-    tables["contacts"]["threshold"] = {**tables["contacts"]["threshold"]}
-    for key, value in changes.items():
-        *path, name = key.split(".")
-        table = tables
-        for one in path:
-            table = table.setdefault(one, {})
-        table[name] = value
-    return tables
-
-
 @cache
 def _run_of(which: int, seed: int) -> Motion:
-    tree = mesoslip.run(_nested(RUNS[which] | {"run.seed": seed}))
+    tree = mesoslip.run(KLEIN.replace(RUNS[which] | {"run.seed": seed}))
     found = mesoslip.slips(tree)
     columns = (found[name].values for name in ("start_time", "end_time", "force_drop"))
     return Motion(tree["time"].values, tree["spring_force"].values[0], *columns)

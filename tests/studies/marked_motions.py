@@ -10,8 +10,6 @@ later. Prints the table of ``docs/regimes.md``::
     .venv/bin/python tests/studies/marked_motions.py [set] [figure]
 """
 
-from __future__ import annotations
-
 import json
 import math
 import sys
@@ -21,7 +19,7 @@ from typing import Any, NamedTuple
 
 import mesoslip
 import numpy as np
-from mesoslip.analysis.regime import NAMES
+from mesoslip.analysis.regime.result import NAMES
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]

@@ -6,8 +6,6 @@ Prints a table and draws the histograms of ``docs/validation.md``::
     .venv/bin/python tests/studies/me_orders.py [docs/me-orders.png]
 """
 
-from __future__ import annotations
-
 import sys
 import tomllib
 from pathlib import Path

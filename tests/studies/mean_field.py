@@ -6,8 +6,6 @@ lattices; prints the tables of ``docs/mean-field.md``::
     .venv/bin/python tests/studies/mean_field.py [figure]
 """
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

@@ -6,8 +6,6 @@ Prints the share of records within three errors, that of 95 % intervals that con
 the records that do not. Usage: measured_rates.py [RECORDS] [FIRST_SEED]
 """
 
-from __future__ import annotations
-
 import math
 import sys
 import time as clock
@@ -16,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 from mesoslip.analysis.experiment_stages import Experiment
-from mesoslip.analysis.rate_and_state import fit_rows
+from mesoslip.analysis.rate_and_state.rows import fit_rows
 from mesoslip.measured.load_point import drive_stages
 from mesoslip.measured.output_groups import stage_group
 from scipy.integrate import solve_ivp

@@ -6,8 +6,6 @@ which nothing attaches within the slip; prints the tables of ``docs/melting-film
     .venv/bin/python tests/studies/melting_film.py [figure]
 """
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

@@ -5,8 +5,6 @@ processors::
     .venv/bin/python tests/studies/motions_map.py [--workers N] [figure]
 """
 
-from __future__ import annotations
-
 import argparse
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path

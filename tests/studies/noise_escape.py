@@ -8,8 +8,6 @@ tau exp(N/N_0) with its chi square: ``docs/steady-sliding.md``; some five minute
     .venv/bin/python tests/studies/noise_escape.py [back_force_ratio] [KEY=VALUE ...]
 """
 
-from __future__ import annotations
-
 import math
 import sys
 from pathlib import Path

@@ -5,8 +5,6 @@ of relaxed contacts.
 Right, the ready run ``vibrating-load`` and its sweep, with the limits of fast and slow vibration.
 """
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

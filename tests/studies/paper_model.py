@@ -5,8 +5,6 @@ It prints the means of the slips after the first, and the scatter of single slip
     .venv/bin/python tests/studies/paper_model.py [figure]
 """
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

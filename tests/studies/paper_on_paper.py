@@ -5,8 +5,6 @@ The files are the fit of two records and its prediction of a third one, as the p
     python tests/studies/paper_on_paper.py out/paper.nc out/paper-4300.nc docs/paper-on-paper.png
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass

@@ -10,8 +10,6 @@ each run that does not agree, and the table of ``docs/cycles.md``; half an hour 
     .venv/bin/python tests/studies/possible_motions.py [--workers N]
 """
 
-from __future__ import annotations
-
 import argparse
 import math
 from collections.abc import Iterator, Sequence

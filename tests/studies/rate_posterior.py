@@ -7,8 +7,6 @@ its law, and the share of 90 % intervals that cover, also of those records alone
 describes. Usage: rate_posterior.py [RECORDS] [FIRST_SEED] [SAMPLES]
 """
 
-from __future__ import annotations
-
 import sys
 import time as clock
 from dataclasses import replace
@@ -16,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 from measured_rates import draw, trace
 from mesoslip.analysis.experiment_stages import Experiment
-from mesoslip.analysis.rate_and_state import records_of
+from mesoslip.analysis.rate_and_state.records import records_of
 from mesoslip.errors import MesoslipError
 from mesoslip.inference.rate_posterior import sample_laws
 

@@ -13,18 +13,18 @@ The table is that of 360 points, which take three minutes; ``tests/python/test_r
 fewer.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 import sys
 from collections import Counter
 from collections.abc import Iterator
+from pathlib import Path
 from typing import NamedTuple
 
 import mesoslip
 import numpy as np
-from mesoslip.analysis.regime import NAMES
+from mesoslip import Config
+from mesoslip.analysis.regime.result import NAMES
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
@@ -34,6 +34,9 @@ STIFFNESSES = (40.0, 97.0, 250.0, 1000.0)
 DELAYS = (0.0, 0.2e-3, 0.5e-3, 1e-3, 2e-3, 6e-3)
 WIDTHS = (0.01, 0.03, 0.1)
 COUNT = 500
+KLEIN = Config.load(
+    Path(__file__).parents[2] / "runs" / "klein.toml", ["output.slip_interval=none"]
+)
 STATIC_FORCE = 18e-6
 MASS = 1.47e-3
 
@@ -62,25 +65,18 @@ class Point(NamedTuple):
         period = 2 * math.pi * math.sqrt(MASS / self.stiffness)
         return 24 * loading + 120 * period + 40 * 9e-9 / self.velocity
 
-    def configuration(self, seed: int) -> dict[str, object]:
-        return {
-            "run": {"duration": self.duration, "seed": seed},
-            "drive": {"velocity": self.velocity},
-            "slider": {"mass": MASS, "stiffness": self.stiffness, "damping_ratio": 0.2},
-            "contacts": {
-                "count": COUNT,
-                "area": 1e-10,
-                "film_thickness": 3.5e-9,
-                "film_density": 956.0,
-                "static_force": STATIC_FORCE,
-                "stiffness": 2000.0,
-                "drag_rate": 2e11,
-                "delay": self.delay,
-                "back_force_ratio": 0.1,
-                "threshold": {"law": "gaussian", "relative_width": self.width},
-            },
-            "output": {"interval": self.duration / 20000},
-        }
+    def configuration(self, seed: int) -> Config:
+        return KLEIN.replace(
+            {
+                "run": {"duration": self.duration, "seed": seed},
+                "drive.velocity": self.velocity,
+                "slider.stiffness": self.stiffness,
+                "contacts.count": COUNT,
+                "contacts.delay": self.delay,
+                "contacts.threshold.relative_width": self.width,
+                "output": {"interval": self.duration / 20000},
+            }
+        )
 
 
 def points() -> list[Point]:

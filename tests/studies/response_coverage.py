@@ -6,21 +6,15 @@ Prints the tables of ``docs/response.md``::
     .venv/bin/python tests/studies/response_coverage.py [steady] [runs] [fits]
 """
 
-from __future__ import annotations
-
 import sys
 from dataclasses import replace
 
 import mesoslip
 import numpy as np
-from mesoslip.analysis.rate_and_state import (
-    Fit,
-    Loading,
-    Record,
-    fit_laws,
-    known_noise,
-    points_of_run,
-)
+from mesoslip.analysis.rate_and_state.noise import known_noise
+from mesoslip.analysis.rate_and_state.points import Loading, points_of_run
+from mesoslip.analysis.rate_and_state.records import Record
+from mesoslip.analysis.rate_and_state.search import Fit, fit_laws
 from mesoslip.analysis.steady_force import SteadyMean, steady_mean
 from numpy.typing import NDArray
 from oracles import Friction, spring_slider

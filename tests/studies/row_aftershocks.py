@@ -6,14 +6,12 @@ Contacts without and with ageing and temperature (Braun and Tosatti, Phys. Rev. 
     python tests/studies/row_aftershocks.py [REALIZATIONS [VELOCITY [DISPLACEMENT]]]
 """
 
-from __future__ import annotations
-
 import sys
 
 import mesoslip
 import numpy as np
 import xarray as xr
-from mesoslip.analysis.events import omori
+from mesoslip.analysis.events.laws import omori
 
 WHOLE = 1
 

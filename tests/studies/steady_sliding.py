@@ -10,10 +10,10 @@ Three comparisons, whose numbers stand in ``docs/steady-sliding.md``::
     .venv/bin/python tests/studies/steady_sliding.py map [figure]  # the boundary, and runs
 """
 
-from __future__ import annotations
-
 import math
 import sys
+import tomllib
+from pathlib import Path
 from typing import Any
 
 import mesoslip
@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+KLEIN = tomllib.loads((Path(__file__).parents[2] / "runs" / "klein.toml").read_text())
 STATIC_FORCE = 18e-6
 MASS = 1.47e-3
 # Velocities of the drive in a period, and in a slow ramp.
@@ -37,15 +38,7 @@ def tables(**changes: dict[str, Any]) -> dict[str, Any]:
         "run": {"engine": "me", "resolution": 0.1},
         "slider": {"mass": MASS, "stiffness": 97.0, "damping_ratio": 0.2},
         "contacts": {
-            "count": 4080,
-            "area": 1e-10,
-            "film_thickness": 3.5e-9,
-            "film_density": 956.0,
-            "static_force": STATIC_FORCE,
-            "stiffness": 2000.0,
-            "drag_rate": 2e11,
-            "delay": 5e-4,
-            "back_force_ratio": 0.1,
+            **KLEIN["contacts"],
             "initial": "steady",
             "threshold": {"law": "gaussian", "relative_width": 0.2},
         },

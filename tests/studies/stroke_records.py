@@ -11,8 +11,6 @@ values are within the stated errors (95 %)::
     .venv/bin/python tests/studies/stroke_records.py 200 400
 """
 
-from __future__ import annotations
-
 import argparse
 import math
 import tempfile
@@ -261,7 +259,7 @@ class Verdict:
 def judged(record: Made) -> Verdict:
     """Read a record as a file, and compare its strokes with the truth."""
     import mesoslip
-    from mesoslip.analysis.strokes import strokes_of
+    from mesoslip.analysis.strokes.catalogue import strokes_of
     from mesoslip.errors import FileError
 
     with tempfile.TemporaryDirectory() as folder:

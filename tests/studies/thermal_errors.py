@@ -6,8 +6,6 @@ before the first slip, the difference from a fine run. For ``docs/validation.md`
     .venv/bin/python tests/studies/thermal_errors.py
 """
 
-from __future__ import annotations
-
 import tomllib
 from pathlib import Path
 from typing import Any

@@ -4,8 +4,6 @@ The ready runs `track.toml` and `pre-sliding.toml`, and forces of the master equ
 tracks beside the linear theory. Half a minute on one core.
 """
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

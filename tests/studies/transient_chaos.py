@@ -8,8 +8,6 @@ with its error by an exponential law: ``docs/cycles.md``; a quarter of an hour::
     .venv/bin/python tests/studies/transient_chaos.py
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

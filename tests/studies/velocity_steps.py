@@ -7,8 +7,6 @@ Laws are fitted for a rigid interface, and with the stiffness of the contacts in
     .venv/bin/python tests/studies/velocity_steps.py [figure]
 """
 
-from __future__ import annotations
-
 import math
 import sys
 from pathlib import Path
@@ -20,7 +18,7 @@ import xarray as xr
 from matplotlib import pyplot as plt
 from mesoslip import Config
 from mesoslip.analysis.experiment_stages import Experiment
-from mesoslip.analysis.response import response_of, rows_of
+from mesoslip.analysis.response.dataset import response_of, rows_of
 from mesoslip.theory.contacts import contact_theory
 from mesoslip.theory.contacts.thermal_sliding import RateAndStateTheory
 from mesoslip.theory.steady_sliding import sliding_of

@@ -9,7 +9,10 @@ from typing import Any, NamedTuple
 
 import xarray as xr
 
-from mesoslip.analysis import avalanches, fronts, plateaus, response, slips, strokes
+from mesoslip.analysis import avalanches, fronts, slips
+from mesoslip.analysis.plateaus.catalogue import plateaus_from
+from mesoslip.analysis.response import dataset, tables
+from mesoslip.analysis.strokes.catalogue import strokes_from
 from mesoslip.configuration.reading import PathLike, as_path
 from mesoslip.errors import FileError
 from mesoslip.output.table_files import PrintedTable, is_printed, write_printed
@@ -29,7 +32,7 @@ def _own(make: Callable[[Any], Any], data: Any) -> _Writers:
 
 
 def _of_response(data: Any) -> _Writers:
-    return _Writers(partial(response.tables, data), partial(response.write_csv, data))
+    return _Writers(partial(tables.tables, data), partial(dataset.write_csv, data))
 
 
 def _of_avalanches(data: Any) -> _Writers:
@@ -39,11 +42,11 @@ def _of_avalanches(data: Any) -> _Writers:
 # By a group or a dimension that only these data have.
 BY_GROUP: dict[str, Callable[[Any], _Writers]] = {
     "steady": _of_response,
-    "cycles": partial(_own, strokes.strokes_from),
+    "cycles": partial(_own, strokes_from),
     "fronts": partial(_own, fronts.fronts_from),
 }
 BY_DIMENSION: dict[str, Callable[[Any], _Writers]] = {
-    "plateau": partial(_own, plateaus.plateaus_from),
+    "plateau": partial(_own, plateaus_from),
     "slip": partial(_own, slips.catalogue_from),
     "avalanche": _of_avalanches,
 }

@@ -14,7 +14,7 @@ import numpy as np
 from mesoslip.analysis.apparatus import apparatus_of
 from mesoslip.analysis.steady_force import SteadyMean, steady_mean
 from mesoslip.analysis.stick_phases import relieved_loading
-from mesoslip.analysis.strokes import output_pieces
+from mesoslip.analysis.strokes.segments import output_pieces
 from mesoslip.array_types import Array, Dataset
 from mesoslip.configuration.drive import DrivePart
 from mesoslip.errors import FileError

@@ -70,7 +70,6 @@ class ContactLives:
 
     @property
     def columns(self) -> tuple[Array, ...]:
-        """The columns in their order."""
         return (
             self.displacement,
             self.birth_stretch,

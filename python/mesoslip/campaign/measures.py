@@ -17,7 +17,8 @@ import numpy as np
 
 from mesoslip.analysis.fronts import FRONT_TYPES, first_front
 from mesoslip.analysis.lyapunov import lyapunov
-from mesoslip.analysis.regime import NAMES, REGIME, regimes
+from mesoslip.analysis.regime.outputs import regimes
+from mesoslip.analysis.regime.result import NAMES, REGIME
 from mesoslip.analysis.return_map import map_exponent as exponent_of_map
 from mesoslip.array_types import Array, DataTree
 from mesoslip.campaign import predictions

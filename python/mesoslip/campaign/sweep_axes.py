@@ -181,7 +181,6 @@ class _Reader:
         return _spread(kind, ends, wanted.spacing, fractions)
 
     def _validated(self, table: type[Wanted], given: object, place: str) -> Wanted | None:
-        """A range as a table."""
         try:
             return table.model_validate(given)
         except ValidationError as error:

@@ -105,7 +105,6 @@ class SweepDataset:
 
 
 def _attributes(key: str) -> dict[str, str]:
-    """Attributes of the coordinate of a key."""
     kind = key_kind(key)
     units = None if kind is None else kind.cf_units
     long_name = key.replace(".", " ").replace("_", " ")

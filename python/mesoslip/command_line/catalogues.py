@@ -155,7 +155,8 @@ def avalanches(
 
 def regime(output: OutputArgument, as_json: JsonOption = False) -> None:
     """Print the regime: smooth, stick-slip, irregular or transient."""
-    from mesoslip.analysis.regime import NAMES, REGIME, judge, summary
+    from mesoslip.analysis.regime.outputs import judge
+    from mesoslip.analysis.regime.result import NAMES, REGIME, summary
     from mesoslip.output import files
 
     with files.opened_arrays(output) as tree:
@@ -241,7 +242,7 @@ def events(
 
     Acoustic emission is compared with the slips of a trace.
     """
-    from mesoslip.analysis import events as analysis
+    from mesoslip.analysis.events import summary as analysis
     from mesoslip.configuration.arguments import check_choice
 
     check_choice("--of", catalogue, analysis.CATALOGUES)
@@ -278,7 +279,7 @@ def plateaus(
 
     Plateaus lie between steps of speed, load or force.
     """
-    from mesoslip.analysis import plateaus as analysis
+    from mesoslip.analysis.plateaus import catalogue as analysis
     from mesoslip.configuration.arguments import check_choice
 
     check_choice("--signal", signal, analysis.SIGNALS)
@@ -303,7 +304,7 @@ def strokes(
 
     The record goes back and forth, or is that of a disc.
     """
-    from mesoslip.analysis import strokes as analysis
+    from mesoslip.analysis.strokes import catalogue as analysis
 
     part = share(middle, "--middle")
     time = revolution_of(period)

@@ -73,14 +73,8 @@ def response(
     quiet: QuietOption = False,
 ) -> None:
     """Print velocity steps, holds, steady forces, rate and state."""
-    from mesoslip.analysis.response import (
-        force_scale,
-        response_arrays,
-        rows_of,
-        scalars_of,
-        tables,
-        write_csv,
-    )
+    from mesoslip.analysis.response.dataset import response_arrays, rows_of, scalars_of, write_csv
+    from mesoslip.analysis.response.tables import force_scale, tables
     from mesoslip.output import targets
     from mesoslip.output.table_files import latex, markdown
 

@@ -248,20 +248,20 @@ def _short_drive(config: Config) -> str:
 def _regimes(results: Results, config: Config, path: Path, stop: Stop) -> str:
     """The regimes of all realizations, which may take longer than short runs; after an interrupt,
     or of strokes, the command that evaluates them."""
-    from mesoslip.analysis import regime
+    from mesoslip.analysis.regime import outputs, result
 
     if config.drive.cycle is not None:
         return f"the drive goes back and forth; 'mesoslip strokes {path}' evaluates its strokes"
-    found: list[regime.RegimeResult] = []
+    found: list[result.RegimeResult] = []
     count = len(results.realizations)
     with progress_shown(count == 1, "regimes") as progress:
-        for one in regime.regimes_of_results(results):
+        for one in outputs.regimes_of_results(results):
             if stop.is_set():
                 return f"complete; 'mesoslip regime {path}' prints the regime"
             found.append(one)
             if len(found) % max(1, count // 100) == 0:
                 progress(len(found) / count)
-    return regime.summary(found)
+    return result.summary(found)
 
 
 def _mean_velocity(results: Results, config: Config) -> str:

@@ -70,7 +70,6 @@ def cells_of(text: str, source: str) -> Cells:
 
 
 def _split(line: str, delimiter: str, source: str, number: int) -> list[str]:
-    """Cells of a line."""
     if delimiter == " ":
         # A space may separate a name from its unit.
         return re.findall(r"\S+(?:\s*[\[(][^\])]*[\])])?", line)

@@ -196,7 +196,6 @@ class Config(Table):
 
     @cached_property
     def contact_kind(self) -> ContactKind:
-        """The kind of contacts."""
         return contact_kind(
             self.run.engine, self.given_contact_keys, self.interaction, self.pressing
         )

@@ -114,7 +114,6 @@ def in_one_unit(key: str, values: Sequence[Any]) -> tuple[str, tuple[str, ...]]:
 
 
 def _numbers(value: Any) -> list[float]:
-    """The finite numbers of a value or a list."""
     inner = value if isinstance(value, list | tuple) else [value]
     return [
         one

@@ -188,7 +188,6 @@ class Stage(Table):
         return self.start_velocity or 0.0, self.end_velocity or 0.0
 
     def part(self, number: int) -> DrivePart:
-        """The stage as a part of the drive."""
         start, end = self._velocities
         duration = self.duration
         if duration is None:
@@ -228,7 +227,6 @@ class Cycle(Table):
         return 4 * self.amplitude * self.frequency
 
     def parts(self) -> Iterator[DrivePart]:
-        """The strokes."""
         last = 2 * self.cycles
         for number in range(last + 1):
             distance = self.amplitude if number in {0, last} else 2 * self.amplitude

@@ -79,7 +79,6 @@ class LoadStage(Table):
         return self
 
     def part(self) -> LoadPart:
-        """The stage as a part of the load."""
         if self.normal_force is not None:
             return LoadPart(self.duration, self.normal_force, self.normal_force)
         return LoadPart(self.duration, self.start_normal_force or 0.0, self.end_normal_force or 0.0)

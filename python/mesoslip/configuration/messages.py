@@ -109,7 +109,6 @@ def all_keys(table: type[Table], outer: str = "") -> Iterator[str]:
 
 
 def tables_in(annotation: Any) -> Iterator[type[Table]]:
-    """The tables that an annotation names."""
     if isinstance(annotation, type) and issubclass(annotation, Table):
         yield annotation
     for part in get_args(annotation):

@@ -182,7 +182,6 @@ def _unit(text: str) -> Unit | None:
 
 
 def _named(name: str) -> Unit | None:
-    """The unit of a name."""
     for symbol, unit in SI.items():
         prefix = name.removesuffix(symbol)
         if prefix != name and prefix in PREFIXES:

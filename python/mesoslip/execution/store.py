@@ -313,7 +313,6 @@ class Store(Pieces):
 
 
 def not_written(path: Path, error: OSError) -> FileError:
-    """The error of a file that could not be written."""
     if error.errno in {errno.ENOSPC, errno.EDQUOT}:
         return WriteError(f"{path}: cannot be written: no space left on the disk")
     return FileError(f"{path}: cannot be written: {error.strerror or error}")

@@ -10,7 +10,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mesoslip.analysis.regime import IRREGULAR, STICK_SLIP, TRANSIENT, judge
+from mesoslip.analysis.regime.outputs import judge
+from mesoslip.analysis.regime.result import IRREGULAR, STICK_SLIP, TRANSIENT
 from mesoslip.analysis.slips import catalogue_of
 from mesoslip.array_types import Array, DataTree
 from mesoslip.configuration.config import Config
@@ -459,7 +460,6 @@ def curve_alone(config: Config) -> Theory:
 
 
 def with_steady_sliding(config: Config, curve: Theory) -> Theory:
-    """The theory of a curve, with the stability of steady sliding."""
     sliding = steady_sliding(config, MAX_WORK)
     if sliding is None:
         return curve

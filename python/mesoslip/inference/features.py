@@ -172,7 +172,6 @@ def _features(text: str, **values: Any) -> Iterator[Feature]:
 
 
 def _whole() -> Iterator[Feature]:
-    """Of the whole trace."""
     yield from _features(WHOLE)
     for one in QUANTILES:
         part = "low" if one < 25 else "high" if one > 75 else "middle"

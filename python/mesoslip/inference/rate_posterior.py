@@ -15,15 +15,9 @@ from functools import cached_property
 
 import numpy as np
 
-from mesoslip.analysis.rate_and_state import (
-    Fit,
-    Noise,
-    NoiseModel,
-    Record,
-    estimated_noise,
-    fit_laws,
-    preferred_law,
-)
+from mesoslip.analysis.rate_and_state.noise import Noise, NoiseModel, estimated_noise
+from mesoslip.analysis.rate_and_state.records import Record
+from mesoslip.analysis.rate_and_state.search import Fit, fit_laws, preferred_law
 from mesoslip.array_types import Array
 from mesoslip.errors import FileError, RunError
 from mesoslip.execution.stop import StoppedError, StopRequest

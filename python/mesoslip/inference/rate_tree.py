@@ -11,7 +11,9 @@ from typing import Any
 import numpy as np
 
 from mesoslip.analysis.experiment_stages import Experiment
-from mesoslip.analysis.rate_and_state import LAWS, assessment, records_of
+from mesoslip.analysis.rate_and_state.law import LAWS
+from mesoslip.analysis.rate_and_state.records import records_of
+from mesoslip.analysis.rate_and_state.rows import assessment
 from mesoslip.array_types import Dataset, DataTree
 from mesoslip.configuration import arguments
 from mesoslip.configuration.units import cf_units, from_cf_units
@@ -58,7 +60,6 @@ class Origin:
     base: None = None
 
     def to_toml(self) -> str:
-        """The configuration."""
         return self.configuration
 
 

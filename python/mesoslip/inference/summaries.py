@@ -18,7 +18,8 @@ from mesoslip.analysis.alternating_extremes import Samples
 from mesoslip.analysis.even_traces import power_spectrum
 from mesoslip.analysis.sampled_slips import FoundSlips
 from mesoslip.analysis.sampled_slips.windows import Windows, lines_through
-from mesoslip.analysis.strokes import Piece, find_slips_between_reversals
+from mesoslip.analysis.strokes.segments import Piece
+from mesoslip.analysis.strokes.slips import find_slips_between_reversals
 from mesoslip.array_types import Array
 from mesoslip.inference.features import (
     BANDS,

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from mesoslip.analysis.apparatus import first_velocity
 from mesoslip.analysis.even_traces import INTERVAL_TOLERANCE
 from mesoslip.analysis.sampled_slips import estimated_period
-from mesoslip.analysis.strokes import Piece, monotone_pieces
+from mesoslip.analysis.strokes.segments import Piece, monotone_pieces
 from mesoslip.array_types import Array, Dataset, DataTree
 from mesoslip.configuration.config import Config
 from mesoslip.errors import ConfigError, FileError, RunError

@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from mesoslip.analysis import slips
-from mesoslip.analysis.regime import NAMES, regimes
+from mesoslip.analysis.regime.outputs import regimes
+from mesoslip.analysis.regime.result import NAMES
 from mesoslip.errors import ConfigError, FileError, MesoslipError, Problem, shown
 from mesoslip.execution.executors import ExecutorLike, ThreadsThenProcesses, as_executor, completed
 from mesoslip.execution.stop import Stop, StopRequest

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from mesoslip.analysis.strokes import monotone_pieces
+from mesoslip.analysis.strokes.segments import monotone_pieces
 from mesoslip.array_types import Array
 from mesoslip.configuration.columns import IGNORED
 from mesoslip.configuration.units import NUMBER, is_number, to_si

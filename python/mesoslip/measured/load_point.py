@@ -209,7 +209,6 @@ def _even_edges(values: Array, count: int) -> Integers:
 
 
 def _means(time: Array, values: Array, edges: Integers, noise: tuple[float, float]) -> _Points:
-    """Means between edges."""
     counts = np.diff(edges).astype(float)
     mean_time = np.add.reduceat(time, edges[:-1]) / counts
     mean = np.add.reduceat(values, edges[:-1]) / counts

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mesoslip.analysis.strokes import monotone_pieces, path_of
+from mesoslip.analysis.strokes.segments import monotone_pieces, path_of
 from mesoslip.array_types import Array
 from mesoslip.errors import FileError, shown
 from mesoslip.measured.columns import FORCES, Assignment, Used, assign, values_of
@@ -71,7 +71,6 @@ class Record:
 
     @property
     def force_name(self) -> str:
-        """Name of the force in outputs."""
         return "friction_coefficient" if self.is_friction else "spring_force"
 
 
@@ -196,7 +195,6 @@ def resolve(trace: TraceDescription, record: Record) -> TraceDescription:
 
 
 def _recorded(table: Table, columns: Assignment, index: int) -> RecordedColumn:
-    """A column as it is in the file."""
     header, position = table.headers[index], str(index + 1)
     use = next((name for name, one in columns.used.items() if one.index == index), "")
     unit = columns.used[use].unit if use else table.units[index]

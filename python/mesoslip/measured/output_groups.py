@@ -71,7 +71,6 @@ def count_group(found: FoundSlips, unit: str) -> Dataset:
 
 
 def stage_group(stages: Sequence[DriveStage]) -> Dataset:
-    """The stages of the drive."""
     group = variables.MEASURED_STAGES
     columns = {
         "realization_index": [0] * len(stages),

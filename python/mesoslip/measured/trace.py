@@ -13,15 +13,9 @@ import numpy as np
 from mesoslip.analysis.apparatus import first_velocity
 from mesoslip.analysis.noise import TraceNoise
 from mesoslip.analysis.sampled_slips import FoundSlips
-from mesoslip.analysis.strokes import (
-    FORCE,
-    angle_of,
-    are_of_track,
-    back_and_forth,
-    find_slips_between_reversals,
-    path_of,
-    record_pieces,
-)
+from mesoslip.analysis.strokes.revolutions import angle_of, are_of_track
+from mesoslip.analysis.strokes.segments import FORCE, back_and_forth, path_of, record_pieces
+from mesoslip.analysis.strokes.slips import find_slips_between_reversals
 from mesoslip.array_types import Array, DataTree
 from mesoslip.configuration.config import Config
 from mesoslip.configuration.reading import PathLike

@@ -242,7 +242,6 @@ def _slips(results: Results) -> GroupLayout:
 
 
 def _table(results: Results, group: Group, table: str, columns: Sequence[str]) -> GroupLayout:
-    """A catalogue with the columns of its table."""
     made = _GroupBuilder(results, group, table)
     for name in columns:
         made.add_column(RENAMED.get(name, name), name)

@@ -111,7 +111,6 @@ def _is_output(path: Path) -> bool:
 
 
 def _not_written(path: Path, target: Path, error: Exception) -> FileError:
-    """The error of a file that could not be written."""
     reason = getattr(error, "strerror", None) or error
     is_full = getattr(error, "errno", None) in {errno.ENOSPC, errno.EDQUOT}
     # HDF5 reports a full disk as an error of its own, or as a lack of permission.

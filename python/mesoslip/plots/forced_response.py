@@ -6,7 +6,8 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from mesoslip.analysis.experiment_stages import Experiment
-from mesoslip.analysis.response import creep_line, friction_line, response_of
+from mesoslip.analysis.response.dataset import response_of
+from mesoslip.analysis.response.forces import creep_line, friction_line
 from mesoslip.array_types import Array
 from mesoslip.configuration.config import Config
 from mesoslip.errors import MesoslipError

@@ -6,8 +6,9 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from mesoslip.analysis.experiment_stages import Experiment
-from mesoslip.analysis.rate_and_state import Fit, fit_laws, preferred_law, records_of
-from mesoslip.analysis.response import response_of, rows_of
+from mesoslip.analysis.rate_and_state.records import records_of
+from mesoslip.analysis.rate_and_state.search import Fit, fit_laws, preferred_law
+from mesoslip.analysis.response.dataset import response_of, rows_of
 from mesoslip.array_types import Array
 from mesoslip.errors import RunError
 from mesoslip.output.arrays import Arrays, Tree

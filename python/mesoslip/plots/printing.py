@@ -87,7 +87,6 @@ class Print:
 
     @property
     def settings(self) -> Any:
-        """The settings of matplotlib."""
         settings = dict(read_style(STYLE_FILE))
         if self.width is not None:
             settings["savefig.dpi"] = PRINT_DPI

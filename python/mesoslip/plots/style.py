@@ -155,7 +155,6 @@ def _legend_columns(axes: Axes, columns: int = 3) -> int:
 
 
 def legend_rows(axes: Axes) -> int:
-    """Rows of a legend above axes."""
     labels = axes.get_legend_handles_labels()[1]
     return -(-len(labels) // _legend_columns(axes))
 

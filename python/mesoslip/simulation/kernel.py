@@ -84,11 +84,11 @@ class Kernel:
         # At exit a thread may still use the simulation.
         self._free.atexit = False
 
-    def _call(self, procedure: Any, *arguments: Any) -> tuple[Any, ...]:
+    def _call(self, procedure: Any, *arguments: Any, **by_name: Any) -> tuple[Any, ...]:
         if not self._lock.acquire(blocking=False):
             raise RunError("the simulation is at work on another thread")
         try:
-            return checked(procedure(self._handle, *arguments))
+            return checked(procedure(self._handle, *arguments, **by_name))
         finally:
             self._lock.release()
 
@@ -125,67 +125,10 @@ class Kernel:
         """Make the slider of a kind from named parameters."""
         self._call(_core.set_slider, kind, *named(parameters))
 
-    def set_drive(
-        self,
-        part_end: Array,
-        start_velocity: Array,
-        end_velocity: Array,
-        stage: NDArray[np.integer[Any]],
-    ) -> None:
-        """Parts of the drive, shape (parts): end time [s], velocities at start and end [m/s], and
-        the number of the stage."""
-        self._call(_core.set_drive, part_end, start_velocity, end_velocity, stage)
-
-    def set_drive_values(self, start_value: Array) -> None:
-        """Force at the start of each part of the drive [N], shape (parts)."""
-        self._call(_core.set_drive_values, start_value)
-
-    def set_stop(
-        self,
-        *,
-        slips: int,
-        displacement: float,
-        block_distance: float,
-        blocks: int,
-        tolerance: float,
-    ) -> None:
-        """Conditions that end the run early: number of slips, displacement of the slider [m],
-        steady state over blocks of a distance of the drive [m]; 0 for those that are not set."""
-        self._call(_core.set_stop, slips, displacement, block_distance, blocks, tolerance)
-
-    def set_recorder(
-        self,
-        *,
-        interval: float,
-        slip_interval: float,
-        slip_velocity: float,
-        quiet_time: float,
-        duration: float,
-        layers: int,
-        blocks: int = 0,
-    ) -> None:
-        """Set the record of the motion; intervals and times in s, 0 for what is not recorded."""
-        self._call(
-            _core.set_recorder,
-            interval,
-            slip_interval,
-            slip_velocity,
-            quiet_time,
-            duration,
-            layers,
-            blocks,
-        )
-
-    def set_avalanches(
-        self,
-        *,
-        min_size: float,
-        snapshot_size: float,
-        max_avalanches: int,
-        snapshot_times: Array,
-    ) -> None:
-        """Set the record of avalanches; 0 for what is not recorded, and for no bound."""
-        self._call(_core.set_avalanches, min_size, snapshot_size, max_avalanches, snapshot_times)
+    def set(self, procedure: Any, **values: Any) -> None:
+        """Set the drive, what ends the run early, or what is recorded: ``_core.set_drive``,
+        ``set_stop`` and such, with their arguments by name."""
+        self._call(procedure, **values)
 
     def start(self, initial: str) -> None:
         """Draw the contacts in an initial state, with the slider in equilibrium with them."""

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mesoslip import _core
 from mesoslip.configuration.drive import DrivePart
 from mesoslip.configuration.kernel_parameters import Parameters, named
 from mesoslip.simulation.kernel import Kernel
@@ -49,9 +50,13 @@ class KernelSetup:
             np.array(numbers) for numbers in zip(*parts, strict=True)
         )
         ends = np.minimum(np.cumsum(durations), NEVER)
-        self._drive = ends, start_velocities, end_velocities, stages
-        self._forces = None if forces is None else np.array(forces)
-        self._stop: dict[str, Any] = {
+        self._drive = {
+            "part_end": ends,
+            "start_rate": start_velocities,
+            "end_rate": end_velocities,
+            "stage": stages,
+        }
+        ends_early = {
             "slips": stop.slips + earlier_slips if stop.slips else 0,
             "displacement": stop.displacement or 0.0,
             "block_distance": config.steady_block,
@@ -60,7 +65,7 @@ class KernelSetup:
             if stop.steady
             else 0.0,
         }
-        self._recorder: dict[str, Any] = {
+        self._recorder = {
             "interval": interval or config.output_interval,
             "slip_interval": config.slip_interval or 0.0,
             "slip_velocity": slider.slip_velocity(config),
@@ -68,31 +73,36 @@ class KernelSetup:
             "layers": slider.layers_recorded(config),
             "blocks": slider.block_count,
         }
-        self._avalanches: dict[str, Any] = {
+        avalanches = {
             "min_size": float(output.avalanche_size or 1) * config.has_avalanches,
             "snapshot_size": float(output.snapshot_size or 0),
             "max_avalanches": config.run.avalanches or 0,
-            "snapshot_times": (start_time or 0.0) + np.array(output.snapshots, dtype=float),
+            "snapshot_time": (start_time or 0.0) + np.array(output.snapshots, dtype=float),
         }
+        self._settings: list[tuple[Any, dict[str, Any]]] = [
+            (_core.set_stop, ends_early),
+            (_core.set_avalanches, avalanches),
+        ]
+        if forces is not None:
+            self._settings.insert(0, (_core.set_drive_values, {"start_value": np.array(forces)}))
 
     def open(self, number: int = 0, *, end_time: float | None = None) -> Kernel:
         """A kernel of a realization that can be started or restored; ``end_time`` [s] of the drive
         replaces that of the configuration."""
-        ends, *rates_and_stages = self._drive
-        if end_time is not None:
-            ends = np.append(ends[:-1], min(end_time, NEVER))
         kernel = Kernel()
         if isinstance(self._parameters, Kernel):
             kernel.copy_contacts(self._parameters)
         else:
             kernel.set_contacts(self._contacts, self._parameters, self._seed, number)
         kernel.set_slider(*self._slider)
-        kernel.set_drive(ends, *rates_and_stages)
-        if self._forces is not None:
-            kernel.set_drive_values(self._forces)
-        kernel.set_stop(**self._stop)
-        kernel.set_recorder(**self._recorder, duration=float(ends[-1]))
-        kernel.set_avalanches(**self._avalanches)
+        drive = self._drive
+        if end_time is not None:
+            ends = np.append(drive["part_end"][:-1], min(end_time, NEVER))
+            drive = drive | {"part_end": ends}
+        kernel.set(_core.set_drive, **drive)
+        kernel.set(_core.set_recorder, **self._recorder, duration=float(drive["part_end"][-1]))
+        for procedure, values in self._settings:
+            kernel.set(procedure, **values)
         return kernel
 
 

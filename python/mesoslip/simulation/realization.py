@@ -419,7 +419,6 @@ class Realization(Recorded):
         return len(completed)
 
     def _add(self, table: str, values: Array) -> None:
-        """Add rows of a table."""
         if len(values):
             rows = self._tables.get(table)
             if rows is None:

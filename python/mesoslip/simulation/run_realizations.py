@@ -143,7 +143,6 @@ class _Run:
             self._checkpoint.visit(*realizations)
 
     def _advance(self, realization: Realization, stop: Stop) -> None:
-        """Advance a realization to its end."""
         self._under_way.add(realization)
         while not (realization.finished or stop.is_set()):
             realization.advance()

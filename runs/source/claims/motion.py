@@ -7,7 +7,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
-from mesoslip.analysis.regime import regimes
+from mesoslip.analysis.regime.outputs import regimes
 from mesoslip.output.access import group_of
 from outputs import configuration
 

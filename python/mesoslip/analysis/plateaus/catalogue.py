@@ -16,7 +16,7 @@ from mesoslip.analysis.apparatus import apparatus_of
 from mesoslip.analysis.plateaus.levels import Level, levels_of
 from mesoslip.analysis.printed_columns import printed_columns
 from mesoslip.analysis.steady_force import NORMAL_95, steady_mean
-from mesoslip.analysis.strokes import output_pieces
+from mesoslip.analysis.strokes.segments import output_pieces
 from mesoslip.array_types import Array, Dataset
 from mesoslip.configuration import arguments
 from mesoslip.configuration.arguments import check_choice

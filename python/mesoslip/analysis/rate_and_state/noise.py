@@ -51,7 +51,6 @@ class Noise:
 
     @property
     def point_deviation(self) -> Array:
-        """Standard deviations of the points."""
         is_white = self.factor.ndim == 1
         return self.factor if is_white else np.linalg.norm(self.factor, axis=1)
 

@@ -4,36 +4,3 @@ It is determined from the spring force in the evaluated window: the second half 
 which the drive moves; the first half counts as transient. ``docs/regimes.md`` explains the rules
 and reports their validation.
 """
-
-from mesoslip.analysis.regime.outputs import judge, regime, regimes, regimes_of_results
-from mesoslip.analysis.regime.result import (
-    IRREGULAR,
-    NAMES,
-    REGIME,
-    SMOOTH,
-    STICK_SLIP,
-    TRANSIENT,
-    RegimeResult,
-    results_of,
-    summary,
-)
-from mesoslip.analysis.regime.rules import classify
-from mesoslip.analysis.regime.scales import Scales
-
-__all__ = [
-    "IRREGULAR",
-    "NAMES",
-    "REGIME",
-    "SMOOTH",
-    "STICK_SLIP",
-    "TRANSIENT",
-    "RegimeResult",
-    "Scales",
-    "classify",
-    "judge",
-    "regime",
-    "regimes",
-    "regimes_of_results",
-    "results_of",
-    "summary",
-]

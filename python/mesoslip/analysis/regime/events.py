@@ -73,7 +73,6 @@ class Slips:
 
     @property
     def as_cycles(self) -> Cycles:
-        """The cycles from slip to slip."""
         return Cycles(np.diff(self.start), self.drop, self.before)
 
 

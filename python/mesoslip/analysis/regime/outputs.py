@@ -22,7 +22,7 @@ from mesoslip.output.inputs import OutputLike, opened_run
 from mesoslip.simulation.recorded_tables import SLIP_COLUMNS, TRACE_COLUMNS
 
 if TYPE_CHECKING:
-    from mesoslip.analysis.strokes import Piece
+    from mesoslip.analysis.strokes.segments import Piece
     from mesoslip.simulation.run_realizations import Results
 
 
@@ -88,7 +88,7 @@ def _pieces(tree: Tree, number: int) -> Sequence[Piece] | None:
     if not is_measured(tree):
         return None
     # Runs do without, which would take longer to import than their regimes.
-    from mesoslip.analysis.strokes import output_pieces
+    from mesoslip.analysis.strokes.segments import output_pieces
 
     return output_pieces(tree, number)[0]
 
@@ -138,7 +138,7 @@ def _in_strokes(
     The parts between reversals are put one after the other, in time too, with forces along the
     motion. Without slips they are smooth, however the friction depends on the position.
     """
-    from mesoslip.analysis.strokes import sliding_of
+    from mesoslip.analysis.strokes.sliding import sliding_of
 
     root = tree.to_dataset()
     time, force = root["time"].values, root[apparatus.force_name][number].values

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mesoslip.analysis.experiment_stages import Experiment
-from mesoslip.analysis.rate_and_state import FIT, fit_rows, fitted_trend
+from mesoslip.analysis.rate_and_state.rows import FIT, fit_rows, fitted_trend
 from mesoslip.analysis.response.columns import (
     CREEP,
     CREEP_LINE,

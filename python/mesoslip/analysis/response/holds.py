@@ -12,7 +12,7 @@ from mesoslip.analysis.response.columns import HOLDS, STEADY, empty_row
 from mesoslip.analysis.response.line import Line, line
 from mesoslip.analysis.response.steps import load_steps
 from mesoslip.analysis.steady_force import SteadyMean, error_of_mean, scatter
-from mesoslip.analysis.strokes import strokes_of
+from mesoslip.analysis.strokes.catalogue import strokes_of
 from mesoslip.errors import FileError
 
 if TYPE_CHECKING:

@@ -113,7 +113,6 @@ class StrokeRecord:
 
 
 def record_of(tree: Tree, realization: int = 0, name: str = "the output") -> StrokeRecord:
-    """A realization of an output as a record of strokes."""
     pieces, source = output_pieces(tree, realization)
     if pieces is None:
         if given_in(tree, "motion") == ONE_WAY:

@@ -61,7 +61,6 @@ class Piece(NamedTuple):
 
     @property
     def samples(self) -> slice:
-        """The samples of the piece."""
         return slice(self.first, self.after)
 
     @property

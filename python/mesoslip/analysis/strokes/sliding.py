@@ -38,7 +38,6 @@ class Sliding:
 
     @property
     def parts(self) -> Iterator[slice]:
-        """The samples of each part."""
         ends = np.flatnonzero(np.diff(self.piece, append=-1)) + 1
         start = 0
         for end in ends.tolist():

@@ -8,8 +8,11 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from mesoslip.analysis.experiment_stages import Experiment
-from mesoslip.analysis.rate_and_state import MAX_MISFIT, Fit, fit_laws, records_of
-from mesoslip.analysis.response import Line, healing_line, response_of, steady_line
+from mesoslip.analysis.rate_and_state.records import records_of
+from mesoslip.analysis.rate_and_state.search import MAX_MISFIT, Fit, fit_laws
+from mesoslip.analysis.response.dataset import response_of
+from mesoslip.analysis.response.holds import healing_line, steady_line
+from mesoslip.analysis.response.line import Line
 from mesoslip.errors import RunError
 from mesoslip.output.arrays import Arrays, Tree
 from mesoslip.plots.axis import logarithmic

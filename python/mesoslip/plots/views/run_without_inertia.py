@@ -63,7 +63,6 @@ def _draw_force(axes: Axes, tree: Tree, extent: Extent, horizontal: HorizontalAx
 
 
 def _against_displacement(extent: Extent) -> Extent:
-    """The extent, against the displacement by default."""
     return replace(extent, against=extent.against or "displacement")
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 
-from mesoslip.analysis.plateaus import Plateaus, plateaus_of
+from mesoslip.analysis.plateaus.catalogue import Plateaus, plateaus_of
 from mesoslip.output.arrays import Tree
 from mesoslip.output.variables import force_among
 from mesoslip.plots.printing import is_narrow

@@ -6,14 +6,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
-from mesoslip.analysis.strokes import (
-    FrictionMap,
-    Strokes,
-    along,
-    friction_map,
-    place_of,
-    strokes_of,
-)
+from mesoslip.analysis.strokes.catalogue import Strokes, strokes_of
+from mesoslip.analysis.strokes.friction_map import FrictionMap, along, friction_map, place_of
 from mesoslip.analysis.strokes.measure import MIDDLE
 from mesoslip.array_types import Array
 from mesoslip.output.arrays import Tree

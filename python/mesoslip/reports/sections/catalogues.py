@@ -17,7 +17,9 @@ from mesoslip.analysis.slips import (
     counts,
     printed_counts,
 )
-from mesoslip.analysis.strokes import has_rotation, output_pieces, strokes_of
+from mesoslip.analysis.strokes.catalogue import strokes_of
+from mesoslip.analysis.strokes.revolutions import has_rotation
+from mesoslip.analysis.strokes.segments import output_pieces
 from mesoslip.errors import FileError
 from mesoslip.output.access import group_of
 from mesoslip.plots.extent import max_size
@@ -99,7 +101,6 @@ def _columns(catalogue: Catalogue) -> dict[str, tuple[str, str]]:
 
 
 def _first_rows(catalogue: Catalogue) -> list[Block]:
-    """The first rows of a catalogue."""
     rows = catalogue.rows
     if not rows:
         return []

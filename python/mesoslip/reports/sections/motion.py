@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from mesoslip.analysis import regime as regimes
-from mesoslip.analysis import response as responses
 from mesoslip.analysis.experiment_stages import Experiment
+from mesoslip.analysis.regime.outputs import judge
+from mesoslip.analysis.regime.result import summary
+from mesoslip.analysis.response.dataset import response_of
+from mesoslip.analysis.response.tables import force_scale, tables
 from mesoslip.errors import FileError
 from mesoslip.output import variables
 from mesoslip.output.access import group_of, is_measured
@@ -20,10 +22,8 @@ def regime(subjects: Sequence[Subject]) -> Section:
     """The regime of the motion of each run."""
     blocks = []
     for subject in subjects:
-        results, motion = regimes.judge(subject.tree, subject.name)
-        text = (
-            regimes.summary(results) if motion is None else f"in the last stage the slider {motion}"
-        )
+        results, motion = judge(subject.tree, subject.name)
+        text = summary(results) if motion is None else f"in the last stage the slider {motion}"
         blocks.append(Text(named(subjects, subject, f"{text[:1].upper()}{text[1:]}.")))
     return Section("Regime", tuple(blocks))
 
@@ -85,9 +85,9 @@ def response(subjects: Sequence[Subject]) -> Section | None:
         return None
     blocks: list[Block] = []
     for subject, experiment in experiments:
-        tree = responses.response_of([experiment])
-        blocks.append(Text(named(subjects, subject, responses.force_scale(tree))))
-        for one in responses.tables(tree):
+        tree = response_of([experiment])
+        blocks.append(Text(named(subjects, subject, force_scale(tree))))
+        for one in tables(tree):
             head, rows = one.head, one.rows
             if any(one.notes):
                 head = (*head, "note")

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import DTypeLike
 
 from mesoslip.analysis.regime.events import MIN_CYCLES
-from mesoslip.array_types import Dataset
 from mesoslip.output.variables import Group, Meaning
 from mesoslip.quantities import percent, with_error, with_unit
 
@@ -132,50 +131,6 @@ class RegimeResult:
 
 # The variables of outputs.
 REGIME = Group({one.name: one.metadata["meaning"] for one in fields(RegimeResult) if one.metadata})
-
-
-def summary(self) -> str:
-        """The regime in words, with the main statistics."""
-        name = NAMES[self.regime].replace("_", "-")
-        if not math.isfinite(self.relative_amplitude):
-            return f"{name}: too few samples to determine a regime"
-        text = (
-            f"{name}: force amplitude {percent(self.relative_amplitude)} of the {self.force_scale}"
-        )
-        if self.regime == SMOOTH:
-            return text
-        if self.cycles < MIN_CYCLES:
-            whole = "1 whole cycle" if self.cycles == 1 else f"{self.cycles} whole cycles"
-            return (
-                f"{text}; {whole} between {with_unit(self.window_start, 's')} "
-                f"and {with_unit(self.window_end, 's')}, at least {MIN_CYCLES} are needed: give a "
-                "longer duration"
-            )
-        period = with_error(self.period, self.period * self.period_variation, "s", 3)
-        if self.are_slips:
-            return f"{text}, a slip every {period} ({self.cycles} times)"
-        return f"{text}, {self.cycles} oscillations of {period}"
-
-    @property
-    def row(self) -> dict[str, Any]:
-        """The values by name, with the types that they have in an output."""
-        return {
-            name: np.dtype(meaning.dtype).type(getattr(self, name)).item()
-            for name, meaning in REGIME.items()
-        }
-
-
-# The variables of outputs.
-REGIME = Group({one.name: one.metadata["meaning"] for one in fields(RegimeResult) if one.metadata})
-
-
-def results_of(data: Dataset) -> list[RegimeResult]:
-    """The results in a dataset of `regimes`, one for each realization."""
-    columns = {name: data[name].values.tolist() for name in REGIME}
-    return [
-        RegimeResult(**dict(zip(columns, row, strict=True)), force_scale=data.attrs["force_scale"])
-        for row in zip(*columns.values(), strict=True)
-    ]
 
 
 def summary(results: list[RegimeResult]) -> str:

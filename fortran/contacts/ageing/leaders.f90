@@ -107,33 +107,30 @@ contains
       end do
    end subroutine gather_leaders
 
-   !> Make leaders of the first contacts of the queue. Thresholds are evaluated when their bucket
-   !> comes to the front: most have grown beyond it.
+   !> Make leaders of the first contacts of the queue, with their present thresholds as limits.
    subroutine gather(self, pose)
       class(ageing_contacts_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
 
-      integer :: wanted, added, position, contact(max_gathered)
+      integer :: wanted, number, added, position, contact(max_gathered)
       real(wp) :: last
 
-      do while (self%queue%unsorted_count() > 0)
-         call self%count_visits(self%queue%unsorted_count())
-         do position = 1, self%queue%unsorted_count()
-            associate (one => self%queue%unsorted(position))
-               if (self%life(life_motion, one) < any_motion) then
-                  call self%solve(one, pose%displacement, pose%time)
-               end if
-            end associate
-         end do
-         call self%queue%renew_front(self%record)
-      end do
       wanted = max(min_gathered, min(max_gathered, self%list(leaders)%count))
       last = self%queue%first_key + wanted * self%stretch / self%parameters%count
-      do added = 0, wanted - 1
-         if (self%queue%first_key > last .or. self%queue%unsorted_count() > 0) exit
-         call self%queue%pop(self%record, contact(added + 1))
+      call self%queue%take(self%record, last, contact(:wanted), number)
+      call self%count_visits(number)
+      added = 0
+      do position = 1, number
+         if (self%life(life_motion, contact(position)) < any_motion) then
+            call self%solve(contact(position), pose%displacement, pose%time)
+         end if
+         if (self%ahead_of(contact(position)) <= last) then
+            added = added + 1
+            contact(added) = contact(position)
+         else
+            call self%put(contact(position))
+         end if
       end do
-      call self%count_visits(added)
       ! Most are beyond all leaders.
       associate (list => self%list(leaders))
          list%contact(added + 1:added + list%count) = list%contact(:list%count)

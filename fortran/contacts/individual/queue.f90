@@ -58,8 +58,8 @@ module mesoslip_contacts_individual_queue
       procedure, non_overridable :: insert, pop, remove, clear
       !> The first contacts, and removal of some of them
       procedure, non_overridable :: preview, remove_previewed
-      !> The contacts of a front that is not sorted yet, and their return after their keys have grown
-      procedure, non_overridable :: unsorted_count, unsorted, renew_front
+      !> Removal of the first contacts up to a key
+      procedure, non_overridable :: take
       procedure, non_overridable, private :: advance_front, take_overflow, bucket_of, append, &
          & place, find_first, sort_front, absorb_late, take_from_bucket, first_overflow
    end type contact_queue_type
@@ -465,52 +465,54 @@ contains
       self%is_sorted = .true.
    end subroutine sort_front
 
-   !> Number of contacts in a front that is not sorted yet.
-   pure function unsorted_count(self) result(number)
-      class(contact_queue_type), intent(in) :: self
-      integer :: number
-
-      number = merge(0, self%front_count, self%is_sorted)
-   end function unsorted_count
-
-   !> One of them.
-   pure function unsorted(self, position) result(contact)
-      class(contact_queue_type), intent(in) :: self
-      !> A number from 1
-      integer, intent(in) :: position
-      integer :: contact
-
-      contact = self%front_contact(position)
-   end function unsorted
-
-   !> Renew the keys of such a front, which may have grown in the records, and sort what remains.
-   subroutine renew_front(self, record)
+   !> Remove the first contacts, up to a key. They are not sorted if there are not too many.
+   subroutine take(self, record, last, contact, number)
       class(contact_queue_type), intent(inout) :: self
       !> Records of all contacts, shape (record_length, number of contacts)
       real(wp), intent(in), contiguous :: record(:, :)
+      !> The key [m]
+      real(wp), intent(in) :: last
+      !> The contacts, up to the size of the array
+      integer, intent(out) :: contact(:)
+      integer, intent(out) :: number
 
-      real(wp) :: key
-      integer(i8) :: bucket
-      integer :: position, remaining
+      number = 0
+      do while (self%first_key <= last .and. number < size(contact))
+         if (self%is_sorted .or. self%late_count > 0 &
+            & .or. number + self%front_count > size(contact)) then
+            call self%pop(record, contact(number + 1))
+            number = number + 1
+         else
+            call take_front(self, last, contact, number)
+            call self%find_first(record)
+         end if
+      end do
+   end subroutine take
 
+   !> Take the contacts up to a key out of a front that is not sorted.
+   pure subroutine take_front(self, last, contact, number)
+      type(contact_queue_type), intent(inout) :: self
+      real(wp), intent(in) :: last
+      integer, intent(inout) :: contact(:), number
+
+      integer :: position, remaining, taken
+
+      taken = number
       remaining = 0
       do position = 1, self%front_count
-         associate (contact => self%front_contact(position))
-            key = ahead_coordinate(record(:, contact), self%direction)
-            bucket = self%bucket_of(key)
-            if (bucket > self%front_bucket) then
-               call self%place(contact, bucket)
-            else
-               remaining = remaining + 1
-               self%front_key(remaining) = key
-               self%front_contact(remaining) = contact
-            end if
-         end associate
+         if (self%front_key(position) <= last) then
+            taken = taken + 1
+            contact(taken) = self%front_contact(position)
+         else
+            remaining = remaining + 1
+            self%front_key(remaining) = self%front_key(position)
+            self%front_contact(remaining) = self%front_contact(position)
+         end if
       end do
       self%front_count = remaining
-      call self%sort_front()
-      call self%find_first(record)
-   end subroutine renew_front
+      self%count = self%count - (taken - number)
+      number = taken
+   end subroutine take_front
 
    !> Make the next nonempty bucket the front.
    subroutine advance_front(self, record)

@@ -478,19 +478,18 @@ contains
 
       number = 0
       do while (self%first_key <= last .and. number < size(contact))
-         if (self%is_sorted .or. self%late_count > 0 &
-            & .or. number + self%front_count > size(contact)) then
+         if (self%is_sorted .or. number + self%front_count + self%late_count > size(contact)) then
             call self%pop(record, contact(number + 1))
             number = number + 1
          else
-            call take_front(self, last, contact, number)
+            call take_unsorted(self, last, contact, number)
             call self%find_first(record)
          end if
       end do
    end subroutine take
 
-   !> Take the contacts up to a key out of a front that is not sorted.
-   pure subroutine take_front(self, last, contact, number)
+   !> Take the contacts up to a key out of a front that is not sorted, and the late ones.
+   pure subroutine take_unsorted(self, last, contact, number)
       type(contact_queue_type), intent(inout) :: self
       real(wp), intent(in) :: last
       integer, intent(inout) :: contact(:), number
@@ -510,9 +509,16 @@ contains
          end if
       end do
       self%front_count = remaining
+      do while (self%late_count > 0)
+         if (self%late_key(1) > last) exit
+         taken = taken + 1
+         contact(taken) = self%late_contact(1)
+         call remove_first(self%late_key, self%late_contact, self%late_count)
+         self%late_count = self%late_count - 1
+      end do
       self%count = self%count - (taken - number)
       number = taken
-   end subroutine take_front
+   end subroutine take_unsorted
 
    !> Make the next nonempty bucket the front.
    subroutine advance_front(self, record)

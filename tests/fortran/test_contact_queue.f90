@@ -31,7 +31,7 @@ contains
       type(contact_queue_type) :: queue
       type(error_type), allocatable :: error
       real(wp) :: record(record_length, count), key, position, uniform(2)
-      integer :: contact, expected, event, other, number, previewed, listed(8)
+      integer :: contact, expected, event, other, number, previewed, listed(8), length
       real(wp) :: listed_key(8)
       logical :: in_order, in_preview
 
@@ -83,12 +83,55 @@ contains
       call check(in_preview .and. (previewed > 0 .or. .not. spread > 0.0_wp), &
          & "the next contacts are listed in their order: " // name)
       call check(queue%count == count, "no contact is lost: " // name)
-      do event = 1, count
+      do event = 1, 100
+         call take_some(queue, record, direction, &
+            & queue%first_key + 20.0_wp * stretch / count, min(count, 200), 0.05_wp * stretch, name)
+      end do
+      do length = count, 1, -max(1, count / 3)
+         call take_some(queue, record, direction, queue%first_key + 0.3_wp * stretch, length, &
+            & 0.0_wp, name)
+      end do
+      do event = 1, queue%count
          call queue%pop(record, contact)
       end do
       call check(queue%count == 0 .and. queue%first_key >= no_key, "emptied: " // name)
 
    end subroutine exercise
+
+   !> Take the first contacts up to a key, as many as have room: no others come before them. They
+   !> are inserted again with larger keys if these grow.
+   subroutine take_some(queue, record, direction, last, length, growth, name)
+      type(contact_queue_type), intent(inout) :: queue
+      real(wp), intent(inout) :: record(:, :)
+      real(wp), intent(in) :: direction, last, growth
+      integer, intent(in) :: length
+      character(len=*), intent(in) :: name
+
+      integer :: contact(length), number, other, before
+      real(wp) :: key(size(record, 2)), former(length), highest, uniform(2)
+
+      do other = 1, size(key)
+         key(other) = no_key
+         if (record(row_stiffness, other) > 0.0_wp) then
+            key(other) = ahead_coordinate(record(:, other), direction)
+         end if
+      end do
+      before = queue%count
+      call queue%take(record, last, contact, number)
+      call check(number == min(length, count(key <= last)) &
+         & .and. queue%count == before - number, "as many are taken as there are: " // name)
+      highest = maxval(key(contact(:number)))
+      former(:number) = key(contact(:number))
+      record(row_stiffness, contact(:number)) = 0.0_wp
+      key(contact(:number)) = no_key
+      call check(highest <= min(last, minval(key)) .and. count(key < no_key) == queue%count &
+         & .and. abs(queue%first_key - minval(key)) <= 0.0_wp, "the first are taken: " // name)
+      if (.not. growth > 0.0_wp) return
+      do other = 1, number
+         call uniform_pair(2_i8, 0_i8, int(contact(other), i8), int(before, i8), 0_i8, uniform)
+         call put(queue, record, direction, contact(other), former(other) + growth * uniform(1)**3)
+      end do
+   end subroutine take_some
 
    !> Pin a contact so that it breaks at a coordinate.
    subroutine put(queue, record, direction, contact, coordinate)

@@ -18,9 +18,10 @@ module mesoslip_contacts_ageing_leaders
 
    public :: bound_leaders, break_leaders, gather_leaders, sort_leaders, add_leader, remove_leader
 
-   !> Contacts that are taken out of the queue together: minimum, as many as there are leaders, and
-   !> maximum, which narrow thresholds reach
-   integer, parameter :: min_gathered = 16, max_gathered = 1024
+   !> Spacings of contacts with evenly spread thresholds within which they are taken out of the
+   !> queue together: minimum, as many as there are leaders, and maximum, which narrow thresholds
+   !> reach; and contacts in them at most, more than a bucket of the queue has
+   integer, parameter :: min_gathered = 16, max_gathered = 256, crowding = 4
 
 contains
 
@@ -112,22 +113,21 @@ contains
       class(ageing_contacts_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
 
-      integer :: wanted, number, added, position, contact(max_gathered)
+      integer :: wanted, number, added, position, contact(crowding * max_gathered)
       real(wp) :: last
 
       wanted = max(min_gathered, min(max_gathered, self%list(leaders)%count))
       last = self%queue%first_key + wanted * self%stretch / self%parameters%count
-      do number = 1, wanted
-         if (self%queue%first_key > last) exit
-         call self%queue%pop(self%record, contact(number))
-      end do
-      number = number - 1
+      call self%queue%take(self%record, last, contact(:crowding * wanted), number)
       call self%count_visits(number)
-      added = 0
+      ! Apart from the next loop: its branches would wait for each of them.
       do position = 1, number
          if (self%life(life_motion, contact(position)) < any_motion) then
             call self%solve(contact(position), pose%displacement, pose%time)
          end if
+      end do
+      added = 0
+      do position = 1, number
          if (self%ahead_of(contact(position)) <= last) then
             added = added + 1
             contact(added) = contact(position)

@@ -39,8 +39,9 @@ module mesoslip_contacts_individual_queue
       real(wp) :: direction = 1.0_wp, edge = 0.0_wp
       real(wp) :: inverse_width = 1.0_wp
       !> The front: contacts with a bucket number up to this one. Those there when it advanced are
-      !> sorted, late ones are in a heap.
+      !> sorted before the first of them is needed, late ones are in a heap.
       integer(i8) :: front_bucket = -1
+      logical :: is_sorted = .true.
       integer :: front_next = 1, front_count = 0, late_count = 0
       real(wp), allocatable :: front_key(:), late_key(:)
       integer, allocatable :: front_contact(:), late_contact(:)
@@ -57,8 +58,10 @@ module mesoslip_contacts_individual_queue
       procedure, non_overridable :: insert, pop, remove, clear
       !> The first contacts, and removal of some of them
       procedure, non_overridable :: preview, remove_previewed
+      !> Removal of the first contacts up to a key
+      procedure, non_overridable :: take
       procedure, non_overridable, private :: advance_front, take_overflow, bucket_of, append, &
-         & find_first, absorb_late, take_from_bucket, first_overflow
+         & place, find_first, sort_front, absorb_late, take_from_bucket, first_overflow
    end type contact_queue_type
 
 contains
@@ -110,6 +113,7 @@ contains
       self%direction = direction
       self%edge = coordinate
       self%front_bucket = -1
+      self%is_sorted = .true.
       self%front_next = 1
       self%front_count = 0
       self%late_count = 0
@@ -140,16 +144,27 @@ contains
       if (bucket <= self%front_bucket) then
          self%late_count = self%late_count + 1
          call push(self%late_key, self%late_contact, self%late_count, key, contact)
-      else if (bucket <= self%front_bucket + self%ring_length) then
+      else
+         call self%place(contact, bucket)
+      end if
+      self%count = self%count + 1
+      self%first_key = min(self%first_key, key)
+   end subroutine insert
+
+   !> Put a contact into its bucket beyond the front.
+   pure subroutine place(self, contact, bucket)
+      class(contact_queue_type), intent(inout) :: self
+      integer, intent(in) :: contact
+      integer(i8), intent(in) :: bucket
+
+      if (bucket <= self%front_bucket + self%ring_length) then
          call self%append(int(iand(bucket, self%ring_length - 1)), contact)
          self%ring_count = self%ring_count + 1
       else
          call self%append(self%overflow, contact)
          self%overflow_first = min(self%overflow_first, bucket)
       end if
-      self%count = self%count + 1
-      self%first_key = min(self%first_key, key)
-   end subroutine insert
+   end subroutine place
 
    !> Remove the first contact of a queue that is not empty.
    subroutine pop(self, record, contact)
@@ -164,6 +179,7 @@ contains
       if (self%front_next > self%front_count .and. self%late_count == 0) then
          call self%advance_front(record)
       end if
+      call self%sort_front()
       from_late = self%late_count > 0
       if (from_late .and. self%front_next <= self%front_count) then
          from_late = before(self%late_key(1), self%late_contact(1), &
@@ -304,6 +320,7 @@ contains
       if (self%front_next > self%front_count .and. self%late_count == 0) then
          call self%advance_front(record)
       end if
+      call self%sort_front()
       call self%absorb_late()
       number = min(limit, self%front_count - self%front_next + 1)
       associate (front => self%front_key(self%front_next:self%front_count))
@@ -368,7 +385,13 @@ contains
       if (self%front_next > self%front_count .and. self%late_count == 0) then
          call self%advance_front(record)
       end if
-      if (self%front_next <= self%front_count) self%first_key = self%front_key(self%front_next)
+      if (self%front_next <= self%front_count) then
+         if (self%is_sorted) then
+            self%first_key = self%front_key(self%front_next)
+         else
+            self%first_key = minval(self%front_key(self%front_next:self%front_count))
+         end if
+      end if
       if (self%late_count > 0) self%first_key = min(self%first_key, self%late_key(1))
    end subroutine find_first
 
@@ -433,7 +456,71 @@ contains
       self%bucket_count(slot) = 0
    end subroutine empty_bucket
 
-   !> Make the next nonempty bucket the front, and sort it.
+   !> Sort the front.
+   pure subroutine sort_front(self)
+      class(contact_queue_type), intent(inout) :: self
+
+      if (self%is_sorted) return
+      call sort(self%front_key, self%front_contact, self%front_count)
+      self%is_sorted = .true.
+   end subroutine sort_front
+
+   !> Remove the first contacts, up to a key. They are not sorted if there are not too many.
+   subroutine take(self, record, last, contact, number)
+      class(contact_queue_type), intent(inout) :: self
+      !> Records of all contacts, shape (record_length, number of contacts)
+      real(wp), intent(in), contiguous :: record(:, :)
+      !> The key [m]
+      real(wp), intent(in) :: last
+      !> The contacts, up to the size of the array
+      integer, intent(out) :: contact(:)
+      integer, intent(out) :: number
+
+      number = 0
+      do while (self%first_key <= last .and. number < size(contact))
+         if (self%is_sorted .or. number + self%front_count + self%late_count > size(contact)) then
+            call self%pop(record, contact(number + 1))
+            number = number + 1
+         else
+            call take_unsorted(self, last, contact, number)
+            call self%find_first(record)
+         end if
+      end do
+   end subroutine take
+
+   !> Take the contacts up to a key out of a front that is not sorted, and the late ones.
+   pure subroutine take_unsorted(self, last, contact, number)
+      type(contact_queue_type), intent(inout) :: self
+      real(wp), intent(in) :: last
+      integer, intent(inout) :: contact(:), number
+
+      integer :: position, remaining, taken
+
+      taken = number
+      remaining = 0
+      do position = 1, self%front_count
+         if (self%front_key(position) <= last) then
+            taken = taken + 1
+            contact(taken) = self%front_contact(position)
+         else
+            remaining = remaining + 1
+            self%front_key(remaining) = self%front_key(position)
+            self%front_contact(remaining) = self%front_contact(position)
+         end if
+      end do
+      self%front_count = remaining
+      do while (self%late_count > 0)
+         if (self%late_key(1) > last) exit
+         taken = taken + 1
+         contact(taken) = self%late_contact(1)
+         call remove_first(self%late_key, self%late_contact, self%late_count)
+         self%late_count = self%late_count - 1
+      end do
+      self%count = self%count - (taken - number)
+      number = taken
+   end subroutine take_unsorted
+
+   !> Make the next nonempty bucket the front.
    subroutine advance_front(self, record)
       class(contact_queue_type), intent(inout) :: self
       real(wp), intent(in), contiguous :: record(:, :)
@@ -458,7 +545,7 @@ contains
          self%front_key(position) = &
             & ahead_coordinate(record(:, self%front_contact(position)), self%direction)
       end do
-      call sort(self%front_key, self%front_contact, self%front_count)
+      self%is_sorted = .false.
    end subroutine advance_front
 
    !> Move contacts from beyond the ring into it, as far as it reaches now. The front is empty.
@@ -474,13 +561,7 @@ contains
       do position = 1, self%front_count
          contact = self%front_contact(position)
          bucket = self%bucket_of(ahead_coordinate(record(:, contact), self%direction))
-         if (bucket <= self%front_bucket + self%ring_length) then
-            call self%append(int(iand(bucket, self%ring_length - 1)), contact)
-            self%ring_count = self%ring_count + 1
-         else
-            call self%append(self%overflow, contact)
-            self%overflow_first = min(self%overflow_first, bucket)
-         end if
+         call self%place(contact, bucket)
       end do
       self%front_count = 0
    end subroutine take_overflow

@@ -377,6 +377,18 @@ def test_the_apparatus_comes_from_the_trace():
         Plan.from_dict(tables)
 
 
+def test_strokes_need_a_drive_in_strokes():
+    """A velocity would simulate another motion, and reject every model after an hour."""
+    drive = {"cycle": {"amplitude": 1e-7, "frequency": 0.5, "cycles": 2}}
+    tree = experiment(drive__velocity=None, drive=drive, run__duration=None)
+    with pytest.raises(FileError, match=r"a.nc: the load point .* back and forth.*drive.cycle"):
+        prepare(tree, Plan.from_dict(fit_tables()), "a.nc")
+    tables = fit_tables()
+    tables["drive"] = drive
+    del tables["run"]["duration"]
+    assert prepare(tree, Plan.from_dict(tables)).summarizer.pieces is not None
+
+
 def test_coefficients_need_a_normal_force():
     tree = measured(experiment())
     tree = xr.DataTree(tree.to_dataset().rename(spring_force="friction_coefficient"))

@@ -696,6 +696,9 @@ def test_statistics_of_slips_are_along_the_motion(tmp_path, command):
     period = drop / (stiffness * speed)
     assert answer["waiting_time"]["maximum"] == pytest.approx(period, rel=0.1)
     assert "backwards" in command.output("slips", tmp_path / "a.nc")
+    found = mesoslip.regime(tree)
+    assert found["period"][0] == pytest.approx(period, rel=0.03)
+    assert found["period_variation"][0] < 0.05
 
 
 def test_slips_before_a_rest_are_found(tmp_path):

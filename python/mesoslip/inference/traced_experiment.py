@@ -261,6 +261,13 @@ def prepare(tree: DataTree, plan: Plan, name: str = "", number: int = 0) -> Expe
         after < interval / 2 and not is_midway,
         _pieces(root, is_known, sampling),
     )
+    directions = {one for part in config.drive_parts for one in part.directions}
+    if summarizer.pieces is not None and len(directions) < 2:
+        raise FileError(
+            f"{_named(name)}the load point of the trace goes back and forth, and the drive of the "
+            "configuration does not: give [drive.cycle], or its times and displacements as "
+            "[drive.history]"
+        )
     length = math.nan
     if WANDER in plan.prior.keys:
         length = measured_length(summarizer, reduced, abs(velocity))

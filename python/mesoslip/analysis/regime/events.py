@@ -48,6 +48,8 @@ class Slips:
     end: Array
     before: Array
     drop: Array
+    stroke: Array | None = None
+    """Number of the stroke of each, between which there are no cycles; None without strokes."""
 
     def __len__(self) -> int:
         return len(self.start)
@@ -60,7 +62,8 @@ class Slips:
     def of(self, kept: NDArray[np.bool_], direction: float = 1.0) -> Slips:
         """Some of them, with forces along a direction."""
         before, drop = direction * self.before[kept], np.abs(self.drop[kept])
-        return Slips(self.start[kept], self.end[kept], before, drop)
+        stroke = None if self.stroke is None else self.stroke[kept]
+        return Slips(self.start[kept], self.end[kept], before, drop, stroke)
 
     @property
     def large(self) -> Slips:
@@ -73,7 +76,11 @@ class Slips:
 
     @property
     def as_cycles(self) -> Cycles:
-        return Cycles(np.diff(self.start), self.drop, self.before)
+        """The cycles from slip to slip."""
+        periods = np.diff(self.start)
+        if self.stroke is not None:
+            periods = periods[np.diff(self.stroke) == 0]
+        return Cycles(periods, self.drop, self.before)
 
 
 NO_SLIPS = Slips(*np.empty((4, 0)))

@@ -155,7 +155,8 @@ def _in_strokes(
     kept = np.isin(slips.start, time[samples])
     sign = sliding.sign[inside][at[kept]]
     ends = np.searchsorted(time[samples], slips.end[kept]).clip(max=glued.size - 1)
-    own = Slips(glued[at[kept]], glued[ends], sign * slips.before[kept], slips.drop[kept])
+    before, stroke = sign * slips.before[kept], sliding.piece[inside][at[kept]]
+    own = Slips(glued[at[kept]], glued[ends], before, slips.drop[kept], stroke)
     stage = Stage(float(glued[0]), float(glued[-1]), 1.0)
     glued, along = _even(glued, along)
     scales = Scales.of_measurement(apparatus, stage, along, noise_level(along))

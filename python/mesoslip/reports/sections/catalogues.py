@@ -91,6 +91,8 @@ def _statistics(subjects: Sequence[Subject], subject: Subject, catalogue: Catalo
     shown = (one.replace("_", " ") for one in STATISTICS)
     head = (f"{count} slip{'s' if count > 1 else ''}", *shown)
     note = "Statistics include the first slip, which is larger if all contacts were relaxed."
+    if catalogue.goes_back:
+        note += " They are along the motion of each slip; slips backwards have negative forces."
     name: list[Block] = [Text(subject.name)] if len(subjects) > 1 else []
     return [*name, Table(head, rows, note)]
 
@@ -105,8 +107,10 @@ def _first_rows(catalogue: Catalogue) -> list[Block]:
     if not rows:
         return []
     shown = rows[:MAX_SLIPS]
-    columns = [("realization", [float(row["realization_index"]) for row in shown], "1", 4)]
-    columns.append(("start", [row["start_time"] for row in shown], "s", 7))
+    columns = [("start", [row["start_time"] for row in shown], "s", 7)]
+    owners = [float(row["realization_index"]) for row in shown]
+    if any(row["realization_index"] for row in rows):
+        columns.insert(0, ("realization", owners, "1", 4))
     # A measured trace has no breaks.
     columns += [
         (header, [row[name] for row in shown], unit, 4)

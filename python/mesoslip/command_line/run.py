@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 import os
 import threading
-from contextlib import suppress
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
 from importlib import import_module
 from itertools import pairwise
 from pathlib import Path
@@ -112,9 +113,8 @@ def run(
         Checkpoint(folder, checked, interval=interval, resume=resume, report=report) as checkpoint,
         stopped_by_signals() as stop,
     ):
-        _import_meanwhile()
         try:
-            with progress_shown(quiet) as progress:
+            with _imported_meanwhile(), progress_shown(quiet) as progress:
                 results = run_realizations(
                     checked,
                     executor=executor_of(workers, scheduler),
@@ -160,12 +160,28 @@ def _is_of_another(path: Path, config: Config) -> bool:
     return files.is_of_another(path, config)
 
 
-def _import_meanwhile() -> None:
+def _import(names: Iterable[str]) -> None:
+    # What fails is imported once more, and fails, where it is needed.
+    with suppress(Exception):
+        for one in names:
+            import_module(one)
+
+
+@contextmanager
+def _imported_meanwhile() -> Iterator[None]:
     """Import what is needed after a run on a thread of its own, while kernels run."""
-    thread = threading.Thread(target=lambda: [import_module(one) for one in LATER], daemon=True)
-    # Without a thread they are imported when they are needed.
-    with suppress(MemoryError, RuntimeError):
+    thread = threading.Thread(target=_import, args=(LATER,), daemon=True)
+    try:
         thread.start()
+    # Without a thread they are imported when they are needed.
+    except (MemoryError, RuntimeError):
+        yield
+        return
+    try:
+        yield
+    finally:
+        # A run may fail at once, and the program should not end in the middle of an import.
+        thread.join()
 
 
 def _partial(path: Path) -> Path:

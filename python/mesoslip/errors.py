@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import PurePath
+from typing import Self
 
 # Maximum number of characters of a value in messages.
 MAX_SHOWN = 100
@@ -61,6 +62,11 @@ class ConfigError(MesoslipError):
     def __init__(self, problems: Sequence[Problem]) -> None:
         self.problems = tuple(problems)
         super().__init__("\n".join(str(problem) for problem in problems))
+
+    @classmethod
+    def of(cls, key: str, message: str, value: object = None) -> Self:
+        """The error of one key, in no file."""
+        return cls([Problem("", key, message, value)])
 
 
 class FileError(MesoslipError):

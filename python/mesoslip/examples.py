@@ -9,7 +9,7 @@ from pathlib import Path
 
 from mesoslip.configuration.config import Config
 from mesoslip.configuration.reading import PathLike, as_path, is_file
-from mesoslip.errors import ConfigError, FileError, Problem
+from mesoslip.errors import ConfigError, FileError
 
 ENDING = ".toml"
 
@@ -72,7 +72,7 @@ def example(name: str, file: PathLike | None = None) -> list[Path]:
         message = "no such example; " + (
             f"did you mean {' or '.join(near)}?" if near else "mesoslip example lists them"
         )
-        raise ConfigError([Problem("", "example", message, name)])
+        raise ConfigError.of("example", message, name)
     target = as_path(file or f"{Path(name).name}{ENDING}")
     if is_file(target):
         raise FileError(f"{target}: exists already; give another name with -o, or remove it")

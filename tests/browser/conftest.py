@@ -119,6 +119,11 @@ class Browser:
         """Wait for the end of the run."""
         self.wait("return document.getElementById('status').textContent == 'done'")
 
+    def open_until_done(self, address: str) -> None:
+        """Open a page, and wait for the end of its run."""
+        self.open(address)
+        self.wait_until_done()
+
     def value(self, name: str, what: str = "value"):
         """A property of an element."""
         return self.driver.execute_script(

@@ -39,8 +39,7 @@ def ask(address: str, path: str = "/", **headers: str) -> int:
 
 
 def test_loads_and_draws_without_asking_anyone(server, browser):
-    browser.open(server.address)
-    browser.wait_until_done()
+    browser.open_until_done(server.address)
     asked = browser.requests()
     assert len(asked) > 3
     assert [url for url in asked if not is_here(url)] == []
@@ -55,8 +54,7 @@ def test_loads_and_draws_without_asking_anyone(server, browser):
 
 
 def test_a_value_is_typed(server, browser):
-    browser.open(server.address)
-    browser.wait_until_done()
+    browser.open_until_done(server.address)
     before = browser.data("force:this run")
     field = browser.element("contacts.static_force")
     field.send_keys(Keys.CONTROL, "a", Keys.NULL, "9 uN", Keys.ENTER)
@@ -67,8 +65,7 @@ def test_a_value_is_typed(server, browser):
 
 
 def test_a_slider_is_moved_by_keys(server, browser):
-    browser.open(server.address)
-    browser.wait_until_done()
+    browser.open_until_done(server.address)
     handle = browser.element("contacts.delay:slider")
     handle.send_keys(Keys.ARROW_RIGHT)
     browser.wait("return document.getElementById('command').textContent.includes('delay')")
@@ -80,8 +77,7 @@ def test_a_slider_is_moved_by_keys(server, browser):
 
 def test_the_picture_follows_a_knob_that_is_being_turned(server, browser):
     """Before it comes to rest, and in the end it is of where the knob is."""
-    browser.open(server.address)
-    browser.wait_until_done()
+    browser.open_until_done(server.address)
     browser.driver.execute_script(
         """
         window.seen = []
@@ -111,8 +107,7 @@ def test_the_picture_follows_a_knob_that_is_being_turned(server, browser):
 
 def test_what_was_marked_is_not_any_more(server, browser):
     """After all changes are taken back: neither a knob that was changed nor an error."""
-    browser.open(server.address)
-    browser.wait_until_done()
+    browser.open_until_done(server.address)
 
     def looks(name, what):
         script = "return getComputedStyle(document.getElementById(arguments[0]))[arguments[1]]"
@@ -184,8 +179,7 @@ def test_each_control_draws_a_new_picture(server, browser, control):
 
 
 def test_a_wrong_value_is_reported_at_its_control(server, browser):
-    browser.open(server.address)
-    browser.wait_until_done()
+    browser.open_until_done(server.address)
     before = browser.data("force:this run")
     assert browser.change("contacts.delay", "<b>1 kg</b>")[1] == "refused"
     assert "<b>1 kg</b>" in browser.text("contacts.delay:message")
@@ -222,8 +216,7 @@ def test_a_link_gives_the_same_picture_and_history_goes_both_ways(server, browse
     browser.wait_until_done()
     link, force = browser.driver.current_url, browser.data("force:this run")
     assert link.endswith("?run=klein&contacts.delay=1+ms&slider.stiffness=80+N/m")
-    browser.open(link)
-    browser.wait_until_done()
+    browser.open_until_done(link)
     assert browser.data("force:this run") == force
     assert browser.value("contacts.delay") == "1 ms"
     assert browser.change("contacts.delay", "2 ms")[1] == "drawn"
@@ -238,8 +231,7 @@ def test_a_link_gives_the_same_picture_and_history_goes_both_ways(server, browse
 
 
 def test_a_ready_run_begins_anew_and_a_pinned_curve_stays(server, browser):
-    browser.open(server.address)
-    browser.wait_until_done()
+    browser.open_until_done(server.address)
     force = browser.data("force:this run")
     browser.element("pin").click()
     assert eventually(lambda: browser.data("force:pinned") == force)
@@ -284,8 +276,7 @@ def test_nothing_serious_stands_in_the_way_of_anybody(server, browser, colours):
 
 def test_a_keyboard_reaches_what_a_mouse_does(server, browser):
     """Names, values with units, the meaning of a knob at its focus, and a status that is read."""
-    browser.open(server.address)
-    browser.wait_until_done()
+    browser.open_until_done(server.address)
     slider = browser.element("contacts.delay:slider")
     assert slider.accessible_name == "delay τd"
     assert slider.aria_role == "slider"
@@ -445,8 +436,7 @@ def test_pages_that_were_left_leave_nothing(browser):
     memory = []
     try:
         for _ in range(6):
-            browser.open(server.address)
-            browser.wait_until_done()
+            browser.open_until_done(server.address)
             browser.driver.get("about:blank")
             # The server's own, and the one that builds pages.
             assert eventually(lambda: server.threads() <= 2, 60)
@@ -504,8 +494,7 @@ def test_a_measured_trace_lies_beside_the_model(browser, tmp_path):
     )
     server = Server("runs/klein.toml", "--trace", str(trace))
     try:
-        browser.open(server.address)
-        browser.wait_until_done()
+        browser.open_until_done(server.address)
         measured, force = browser.data("force:measured"), browser.data("force:this run")
         assert 17.0 < max(measured) < 18.0
         assert measured != force
@@ -581,8 +570,7 @@ def test_many_changes_at_random():
     chance = random.Random(1)
     server, browser = Server("runs/klein.toml"), Browser()
     try:
-        browser.open(server.address)
-        browser.wait_until_done()
+        browser.open_until_done(server.address)
         first = browser.text("command")
         drawn, refused, memory, before = [], 0, [], server.computing_time()
         for number in range(CHANGES):

@@ -29,16 +29,10 @@ def patience(seconds: float) -> float:
 
 @dataclass(eq=False)
 class Apart:
-    """A function at work in another process.
+    """A function at work in another process, whose result comes back if it can be pickled.
 
-    Parameters
-    ----------
-    function
-        What is called there; its result comes back if it can be pickled.
-    seconds
-        Time that it has, more where others share the processors.
-    log
-        File that takes what is written to its standard streams.
+    Its time in seconds is longer where others share the processors; the log takes what is written
+    to its standard streams.
     """
 
     function: Callable[[], Any]
@@ -189,14 +183,7 @@ def limit_memory() -> None:
 class Command:
     """A command in a process of its own, to be sent signals.
 
-    Parameters
-    ----------
-    arguments
-        What it is called with.
-    folder
-        Folder that it works in; what it says is kept beside that.
-    prepare
-        Called in the new process before the command.
+    What it says is kept beside the folder that it works in; `prepare` is called before it there.
     """
 
     def __init__(

@@ -133,25 +133,10 @@ def fuzz(
     kept: Path | None = None,
     tell: Callable[[str], None] = print,
 ) -> dict[str, list[str]]:
-    """Try cases.
+    """Try so many cases of each attack, and find what did not hold, by the names of cases.
 
-    Parameters
-    ----------
-    counts
-        Cases of each attack.
-    seed, only
-        What the cases are made of; or the names of the only ones.
-    jobs
-        Cases at the same time.
-    kept
-        Folder for what is found.
-    tell
-        Called with a line for each case that does not hold, and with a table in the end.
-
-    Returns
-    -------
-    dict
-        What did not hold, by the names of cases.
+    Cases are made of the seed; `only` names the only ones. What is found is kept in a folder, and
+    a line is told for each case that does not hold, and a table in the end.
     """
     names = only or [
         f"{attack}:{seed}:{number}" for attack, count in counts.items() for number in range(count)

@@ -7,7 +7,8 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Generator
+import time
+from collections.abc import Callable, Generator
 from pathlib import Path
 from typing import Any
 
@@ -129,6 +130,14 @@ def problem_of(tables: dict[str, Any]) -> Problem:
         Config.from_dict(tables)
     (problem,) = caught.value.problems
     return problem
+
+
+def wait_until(condition: Callable[[], object], seconds: float = 60.0) -> None:
+    """Wait for something that must come to hold in time."""
+    deadline = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
 
 
 def at_end(one: Any, advances: int | None = None) -> Any:

@@ -656,7 +656,7 @@ def inode(path):
 
 @pytest.mark.parametrize("long_run", ["contacts", long("thermal populations")], indirect=True)
 def test_killed_runs_go_on(long_run, tmp_path):
-    """SIGKILL and SIGTERM at moments of all kinds; tests/resume/kill.py does it for hours."""
+    """SIGKILL and SIGTERM at moments of all kinds; tests/resume/kill_runs.py does it for hours."""
     expected, output = mesoslip.run(long_run), tmp_path / "killed.nc"
     folder = checkpoint_folder(output)
     random = np.random.default_rng(1)

@@ -5,13 +5,12 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import mesoslip
 import numpy as np
 import pytest
-from conftest import klein_tables
+from conftest import klein_tables, wait_until
 from invariants import differences
 from mesoslip import Config, FileError, RunError
 from mesoslip.campaign.sweep_plan import Plan
@@ -44,10 +43,7 @@ class Cluster:
             "scheduler", "--host", "127.0.0.1", "--port", "0", "--scheduler-file", self.file
         )
         self.workers = [self.add_worker() for _ in range(workers)]
-        deadline = time.monotonic() + 60
-        while not self.file.exists():
-            assert time.monotonic() < deadline
-            time.sleep(0.1)
+        wait_until(lambda: self.file.exists())
         self.address = json.loads(self.file.read_text())["address"]
 
     def _start(self, *arguments: object) -> subprocess.Popen[bytes]:

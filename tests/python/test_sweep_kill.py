@@ -5,14 +5,13 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import mesoslip
 import numpy as np
 import pytest
 import xarray as xr
-from conftest import long
+from conftest import long, wait_until
 from kill_sweep import Study, is_alive, points_of, workers_of
 from test_sweep import SIMPLE, sweep_file, tables
 
@@ -44,18 +43,12 @@ def test_workers_end_with_their_sweep_in_the_midst_of_a_point(tmp_path, sweep_fi
     (tmp_path / "own.py").write_text(ENDLESS)
     path = sweep_file(SIMPLE.replace("mean_force", "own.py:slow"))
     process = begin(path, tmp_path / "sweep.nc", "--pool", "processes", "--workers", "2")
-    deadline = time.monotonic() + 60
-    while len(list(tmp_path.glob("*.begun"))) < 2:
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
+    wait_until(lambda: len(list(tmp_path.glob("*.begun"))) >= 2)
     children = workers_of(process.pid)
     assert {f"{one}.begun" for one in children} == {one.name for one in tmp_path.glob("*.begun")}
     process.kill()
     process.wait()
-    deadline = time.monotonic() + 10
-    while any(map(is_alive, children)):
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
+    wait_until(lambda: not any(map(is_alive, children)), 10)
     # Workers have it too, and it would be waited for them.
     process.communicate()
 
@@ -95,10 +88,7 @@ def test_ctrl_c_keeps_what_is_done(pool, tmp_path, sweep_file, command):
     (tmp_path / "slow").touch()
     output = tmp_path / "out" / "sweep.nc"
     process = begin(sweep_file(SLOW), output, "--pool", pool, "--workers", "2")
-    deadline = time.monotonic() + 60
-    while len(points_of(output)) < 4:
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
+    wait_until(lambda: len(points_of(output)) >= 4)
     children = workers_of(process.pid)
     # As a terminal does it: to all of them.
     os.killpg(process.pid, signal.SIGINT)
@@ -215,10 +205,7 @@ def test_an_earlier_output_outlives_a_sweep_that_is_stopped(tmp_path, sweep_file
     output = tmp_path / "sweep.nc"
     earlier = earlier_output(output)
     process = begin(sweep_file(SLOW), output, "--pool", "threads", "--workers", "2")
-    deadline = time.monotonic() + 60
-    while not points_of(output):
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
+    wait_until(lambda: points_of(output))
     process.send_signal(signal.SIGTERM)
     process.communicate(timeout=60)
     assert process.returncode == 143

@@ -1,16 +1,14 @@
 """Kill a fit at random moments, call it again, and compare every byte of the posterior.
 
-Usage: kill_fit.py [KILLS] [--tally FILE]. Of each fit it is checked that
+Of each fit it is checked that
 
 - the posterior is to the bit that of a fit that was not killed,
 - no simulation that was stored is lost or written again,
 - nothing but the posterior remains.
 
-Exit status 0 if nothing was wrong. A short version is in tests/python/test_fit_kill.py.
+A short version is in tests/python/test_fit_kill.py.
 """
 
-import os
-import sys
 import tempfile
 from pathlib import Path
 
@@ -18,14 +16,10 @@ import emcee  # noqa: F401
 import mesoslip.inference.fit_trace  # noqa: F401
 import numpy as np
 import tomli_w
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "python"))
-sys.path.insert(0, str(Path(__file__).parents[1] / "fuzz"))
-
 from apart import Command
 from invariants import differences
 from mesoslip.output.writing import write
-from tally import Tally, arguments
+from tally import Tally
 from test_fit import experiment, fit_tables
 from test_resume import read_whole
 
@@ -59,14 +53,7 @@ def prepared(folder: Path) -> list[object]:
 def attack(kills: int, folder: Path, random: np.random.Generator) -> Tally:
     """Kill a fit so many times at least, again and again from the beginning; each comes to its end.
 
-    Parameters
-    ----------
-    kills
-        Least number of kills.
-    folder
-        An empty one; what the fits print is written beside it.
-    random
-        Gives the moments.
+    The random numbers give the moments; what the fits print is written beside the empty folder.
     """
     line = prepared(folder)
     expected, output = folder / "whole.nc", folder / "posterior.nc"
@@ -114,13 +101,3 @@ def attack_in_new_folder(kills: int, random: np.random.Generator) -> Tally:
         folder = Path(name) / "folder"
         folder.mkdir()
         return attack(kills, folder, random)
-
-
-def main() -> None:
-    given = arguments(__doc__, 75)
-    random = np.random.default_rng(int(os.environ.get("SEED", "1")))
-    attack_in_new_folder(given.kills, random).end(given.tally)
-
-
-if __name__ == "__main__":
-    main()

@@ -1,16 +1,14 @@
 """Kill a sweep and its workers at random moments, call it again, and compare every byte.
 
-Usage: kill_sweep.py [KILLS] [--tally FILE]. A sweep of 300 points is killed, as a whole or one of
-its workers, and called again until it is whole; and again from the beginning until there were so
-many kills. Of each it is checked that
+A sweep of 300 points is killed, as a whole or one of its workers, and called again until it is
+whole; and again from the beginning until there were so many kills. Of each it is checked that
 
 - the dataset is to the bit that of a sweep that nobody has killed,
 - no point that was stored is computed or written again,
 - no more points are computed than there are, and were under way when something was killed,
 - workers end with the sweep.
 
-Prints what was found; exit status 0 if nothing was wrong. A short version is in
-tests/python/test_sweep_kill.py.
+A short version is in tests/python/test_sweep_kill.py.
 """
 
 import json
@@ -25,12 +23,9 @@ from pathlib import Path
 
 import numpy as np
 import xarray as xr
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "python"))
-
 from conftest import klein_tables
 from mesoslip import Config
-from tally import Tally, arguments
+from tally import Tally
 
 WORKERS = 2
 OWN = '''
@@ -230,13 +225,3 @@ def attack_in_new_folder(kills: int, random: np.random.Generator) -> Tally:
     for message in study.wrong:
         (tally.differing if message.endswith("differs") else tally.lost).append(message)
     return tally
-
-
-def main() -> None:
-    given = arguments(__doc__, 100)
-    random = np.random.default_rng(int(os.environ.get("SEED", "1")))
-    attack_in_new_folder(given.kills, random).end(given.tally)
-
-
-if __name__ == "__main__":
-    main()

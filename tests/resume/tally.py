@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import json
 import sys
 from collections import Counter
@@ -12,11 +11,6 @@ from pathlib import Path
 
 class Tally:
     """Counts of kills, of outputs that differ in a bit, and of what was lost.
-
-    Parameters
-    ----------
-    kinds
-        What is killed.
 
     Attributes
     ----------
@@ -69,20 +63,9 @@ class Tally:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(json.dumps({**counts, **found}, indent=1) + "\n")
 
-    def end(self, path: Path | None) -> None:
-        """Print the counts, keep them, and exit with status 0 if nothing was wrong."""
+    def end(self) -> None:
+        """Print the counts, and exit with status 0 if nothing was wrong."""
         for message, count in Counter(self.differing + self.lost).items():
             print(f"wrong: {message} ({count} times)")
         print(self)
-        if path is not None:
-            self.write(path)
         sys.exit(not self.is_right)
-
-
-def arguments(description: str | None, kills: int) -> argparse.Namespace:
-    """Arguments of a script: number of kills, factor of the durations, file of the tally."""
-    parser = argparse.ArgumentParser(description=(description or "").partition("\n")[0])
-    parser.add_argument("kills", nargs="?", type=int, default=kills)
-    parser.add_argument("--scale", type=float, default=1.0, help="factor of the durations")
-    parser.add_argument("--tally", type=Path, help="JSON file that takes the counts")
-    return parser.parse_args()

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from mesoslip.array_types import Array
 from mesoslip.configuration import arguments
 from mesoslip.configuration.config import Config
-from mesoslip.errors import ConfigError, FileError, Problem, RunError
+from mesoslip.errors import ConfigError, FileError, RunError
 from mesoslip.output.inputs import ConfigLike, as_config
 from mesoslip.output.targets import written_whole
 from mesoslip.simulation.realization import Realization
@@ -305,10 +305,10 @@ def mean_field(config: ConfigLike, *, progress: Callable[[float], None] | None =
     checked = as_config(config)
     if not checked.contact_kind.on_lattice:
         message = "needed: without neighbours the master equation is exact for many contacts"
-        raise ConfigError([Problem("", "interaction", message)])
+        raise ConfigError.of("interaction", message)
     if not checked.contacts.reattach:
         message = "must be true: contacts that do not attach again have no steady sliding"
-        raise ConfigError([Problem("", "contacts.reattach", message, False)])
+        raise ConfigError.of("contacts.reattach", message, False)
     sliding = _sliding(checked)
     parts, forces = [], []
     count = checked.run.realizations

@@ -118,7 +118,7 @@ def _values(text: str) -> tuple[str, list[float]]:
     import numpy as np
 
     from mesoslip.configuration.keys import key_kind, nearest_keys
-    from mesoslip.errors import ConfigError, Problem
+    from mesoslip.errors import ConfigError
 
     key, _, span = text.partition("=")
     parts = span.split(":")
@@ -131,7 +131,7 @@ def _values(text: str) -> tuple[str, list[float]]:
     elif points > MAX_POINTS:
         message = f"has too many points; the maximum is {MAX_POINTS}"
     if kind is None or not 2 <= points <= MAX_POINTS:
-        raise ConfigError([Problem("", "--continue", message, text)])
+        raise ConfigError.of("--continue", message, text)
     low, high = (
         quantity(part, "--continue", kind.unit or "1", kind.example, positive=True)
         for part in parts[:2]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, Protocol,
 
 import typer
 
-from mesoslip.errors import ConfigError, Problem, WriteError
+from mesoslip.errors import ConfigError, WriteError
 
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
@@ -65,7 +65,7 @@ def _only_format(context: typer.Context, parameter: typer.CallbackParam, is_give
         name = parameter.opts[0]
         first = context.meta.setdefault("format", name)
         if first != name:
-            raise ConfigError([Problem("", name, f"does not go with {first}: give one format")])
+            raise ConfigError.of(name, f"does not go with {first}: give one format")
     return is_given
 
 
@@ -319,11 +319,11 @@ def quantity(
     try:
         value = text_to_si(text, unit, example)
     except ValueError as error:
-        raise ConfigError([Problem("", option, str(error), text)]) from None
+        raise ConfigError.of(option, str(error), text) from None
     if positive and value <= 0:
-        raise ConfigError([Problem("", option, "must be greater than 0", text)])
+        raise ConfigError.of(option, "must be greater than 0", text)
     if not negative and value < 0:
-        raise ConfigError([Problem("", option, "must not be negative", text)])
+        raise ConfigError.of(option, "must not be negative", text)
     return value
 
 
@@ -346,8 +346,7 @@ def share(text: str, option: str) -> float:
     except ValueError:
         value = -1.0
     if rest or not 0 < value <= 1:
-        message = "must be a share above 0 and up to 100 %, such as '80%'"
-        raise ConfigError([Problem("", option, message, text)])
+        raise ConfigError.of(option, "must be a share above 0 and up to 100 %, such as '80%'", text)
     return value
 
 

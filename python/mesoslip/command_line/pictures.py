@@ -198,7 +198,7 @@ def plot(
 
 def _path(picture: Path | None, output: Path, file_format: str | None) -> Path:
     """The file of a picture in a format, .png by default; by default it is beside the output."""
-    from mesoslip.errors import ConfigError, Problem
+    from mesoslip.errors import ConfigError
 
     ending = f".{(file_format or 'png').lower().removeprefix('.')}"
     if picture is None:
@@ -206,6 +206,5 @@ def _path(picture: Path | None, output: Path, file_format: str | None) -> Path:
     if file_format is None or picture.suffix.lower() == ending:
         return picture
     if picture.suffix.lower() in FORMATS:
-        text = f"is not the format of {picture.name}"
-        raise ConfigError([Problem("", "--format", text, file_format)])
+        raise ConfigError.of("--format", f"is not the format of {picture.name}", file_format)
     return picture.with_name(f"{picture.name}{ending}")

@@ -11,7 +11,7 @@ import typer
 
 from mesoslip.command_line.options import SavedOption, counted, option, workers_option
 from mesoslip.command_line.progress import progress_shown, say, steps_shown
-from mesoslip.errors import ConfigError, FileError, Problem
+from mesoslip.errors import ConfigError, FileError
 
 if TYPE_CHECKING:
     from mesoslip.array_types import DataTree
@@ -191,7 +191,7 @@ def _read_each(
     from mesoslip.output import table_files, targets
 
     if dry_run:
-        raise ConfigError([Problem("", "--dry-run", "prints one file; leave out --batch")])
+        raise ConfigError.of("--dry-run", "prints one file; leave out --batch")
     description, measurements = batch.described(files)
     pieces = batch.pieces_of(measurements, folder, description, options)
     targets.check_writable(table, files)

@@ -103,7 +103,7 @@ def instance(kind: type[T] | tuple[type[T], ...], wanted: str) -> Callable[[Any]
 def check_choice(key: str, value: str | None, choices: Iterable[str]) -> None:
     """Check that a value is None or one of some choices."""
     if value is not None and not (isinstance(value, str) and value in choices):
-        raise ConfigError([Problem("", key, f"must be one of {', '.join(choices)}", value)])
+        raise ConfigError.of(key, f"must be one of {', '.join(choices)}", value)
 
 
 def function(value: Any) -> Any:

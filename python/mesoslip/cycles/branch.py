@@ -22,7 +22,7 @@ from mesoslip.cycles.cycle import MAX_WORK, master_equation, settled_cycle
 from mesoslip.cycles.cycle_result import Cycle
 from mesoslip.cycles.section import Level, Motion
 from mesoslip.cycles.settling import TOLERANCE
-from mesoslip.errors import ConfigError, Problem
+from mesoslip.errors import ConfigError
 from mesoslip.output import variables
 from mesoslip.output.inputs import ConfigLike, as_config
 from mesoslip.output.provenance import program_attributes
@@ -180,9 +180,9 @@ def _end_between(
 def _check(key: str, values: Sequence[float]) -> None:
     if not any(fnmatchcase(key, one) for one in CONTINUED) or key_kind(key) is None:
         known = ", ".join(CONTINUED)
-        raise ConfigError([Problem("", "key", f"must be one of {known}", key)])
+        raise ConfigError.of("key", f"must be one of {known}", key)
     if len(values) < 2 or not np.all(np.diff(values) > 0):
-        raise ConfigError([Problem("", key, "needs at least two values, ascending")])
+        raise ConfigError.of(key, "needs at least two values, ascending")
 
 
 def _next(

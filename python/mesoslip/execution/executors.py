@@ -16,7 +16,7 @@ from numbers import Integral
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, Union
 
-from mesoslip.errors import ConfigError, Problem
+from mesoslip.errors import ConfigError
 from mesoslip.execution.cluster import GONE, ClusterPool, connected
 from mesoslip.execution.local import LocalPool
 from mesoslip.execution.pool import Function, Piece, Pool, PoolError, Result
@@ -103,7 +103,7 @@ class Dask(Executor):
             self.cluster, "get_executor"
         ):
             message = "must be a distributed.Client, an address, or a scheduler file"
-            raise ConfigError([Problem("", "cluster", message, self.cluster)])
+            raise ConfigError.of("cluster", message, self.cluster)
 
     @contextmanager
     def open(self, stop: Stop) -> Iterator[Pool]:  # noqa: ARG002
@@ -132,7 +132,7 @@ def checked_workers(workers: Any) -> int:
             "must be a whole number of workers of at least 1, or an executor such as "
             "mesoslip.Threads(4); the default is one thread for each processor"
         )
-        raise ConfigError([Problem("", "executor", message, workers)])
+        raise ConfigError.of("executor", message, workers)
     return int(workers)
 
 

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable
 
 from mesoslip.configuration.config import Config
-from mesoslip.errors import ConfigError, Problem
+from mesoslip.errors import ConfigError
 from mesoslip.execution.stop import StopRequest
 from mesoslip.simulation.memory import check_memory, free_memory
 from mesoslip.simulation.realization import Realization
@@ -86,7 +86,7 @@ def runnable(config: Config) -> Config:
         message = (
             f"more than {MAX_CONTACTS} contacts take too long to start on a page: use mesoslip run"
         )
-        raise ConfigError([Problem("", "contacts.count", message, count)])
+        raise ConfigError.of("contacts.count", message, count)
     check_memory(wanted, MAX_MEMORY_PART * free_memory())
     return wanted
 

@@ -9,7 +9,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from mesoslip.configuration.config import Config
-from mesoslip.errors import ConfigError, Problem
+from mesoslip.errors import ConfigError
 from mesoslip.execution.stop import StoppedError, StopRequest
 from mesoslip.explorer.live_run import explored, run_live
 from mesoslip.output.tree import build_tree
@@ -74,7 +74,7 @@ def recorded_for_movie(config: Config) -> tuple[str, Config]:
         return "layers", wanted.replace({"output.layers": True})
     if not wanted.contact_kind.is_discrete:
         message = 'a movie shows contacts one by one, which engine "eq" has'
-        raise ConfigError([Problem("", "run.engine", message, config.run.engine)])
+        raise ConfigError.of("run.engine", message, config.run.engine)
     return "contacts", wanted
 
 

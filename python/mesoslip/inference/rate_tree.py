@@ -17,7 +17,7 @@ from mesoslip.analysis.rate_and_state.rows import assessment
 from mesoslip.array_types import Dataset, DataTree
 from mesoslip.configuration import arguments
 from mesoslip.configuration.units import cf_units, from_cf_units
-from mesoslip.errors import ConfigError, FileError, Problem
+from mesoslip.errors import ConfigError, FileError
 from mesoslip.execution.stop import StopRequest
 from mesoslip.inference.checks import MAX_R_HAT, draw_warnings, shrinkage
 from mesoslip.inference.posterior import PERCENTILES, draws_group, interval_digits, suffix
@@ -133,7 +133,7 @@ def response_posterior(
     unknown = [one for one in laws if one not in LAWS]
     if unknown:
         choice = ", ".join(repr(one) for one in LAWS)
-        raise ConfigError([Problem("", "law", f"must be one of {choice}", unknown[0])])
+        raise ConfigError.of("law", f"must be one of {choice}", unknown[0])
     with opened_run(output) as (tree, name):
         experiment = Experiment(tree, name)
         records = (

@@ -14,7 +14,7 @@ import numpy as np
 from mesoslip.analysis import slips
 from mesoslip.analysis.regime.outputs import regimes
 from mesoslip.analysis.regime.result import NAMES
-from mesoslip.errors import ConfigError, FileError, MesoslipError, Problem, shown
+from mesoslip.errors import ConfigError, FileError, MesoslipError, shown
 from mesoslip.execution.executors import ExecutorLike, ThreadsThenProcesses, as_executor, completed
 from mesoslip.execution.stop import Stop, StopRequest
 from mesoslip.measured.trace import trace_of
@@ -152,5 +152,5 @@ def described(files: Sequence[Path]) -> tuple[Path | None, list[Path]]:
         return None, list(files)
     if not others:
         message = "needs the files of the measurements after their description"
-        raise ConfigError([Problem("", "--batch", f"{message}, {shown(first.name)}")])
+        raise ConfigError.of("--batch", f"{message}, {shown(first.name)}")
     return first, others

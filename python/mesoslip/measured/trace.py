@@ -19,7 +19,7 @@ from mesoslip.analysis.strokes.slips import find_slips_between_reversals
 from mesoslip.array_types import Array, DataTree
 from mesoslip.configuration.config import Config
 from mesoslip.configuration.reading import PathLike
-from mesoslip.errors import ConfigError, Problem
+from mesoslip.errors import ConfigError
 from mesoslip.measured.load_point import drive_stages
 from mesoslip.measured.measured_record import Record, RecordedColumn
 from mesoslip.measured.output_groups import count_group, noise_group, slip_group, stage_group
@@ -193,7 +193,7 @@ def trace_of(understood: Understood) -> DataTree:
     )
     if pieces is None and trace.motion == "strokes":
         message = f"the {cut_by} has no reversals that stand out of the noise"
-        raise ConfigError([Problem("", "--motion", message, trace.motion)])
+        raise ConfigError.of("--motion", message, trace.motion)
     if pieces is not None:
         # Only its size is known, as the drive goes back and forth.
         velocity = None if drive is None else _mean_speed(record.time, drive)

@@ -50,7 +50,7 @@ class Understood:
         highest = 0.5 / float(np.median(np.diff(time))) if time.size > 1 else math.inf
         if hum is not None and hum >= highest:
             message = f"must be below half of the sampling rate, {with_unit(highest, 'Hz', 4)}"
-            raise ConfigError([Problem("", "hum", message, hum)])
+            raise ConfigError.of("hum", message, hum)
         return estimate_noise(time, self.record.force, hum=hum)
 
     @property
@@ -81,7 +81,7 @@ def understand(
     """Read the file of a measurement, with keys of the table [trace]; see `read_trace`."""
     files = [file] if isinstance(file, str | Path) or not isinstance(file, Sequence) else file
     if not files:
-        raise ConfigError([Problem("", "file", "expected at least one file of a measurement", [])])
+        raise ConfigError.of("file", "expected at least one file of a measurement", [])
     experiment, paths, beside = describe([as_path(one) for one in files], options)
     model = beside if config is None else config_of_file(config)
     trace = experiment.trace
@@ -107,10 +107,10 @@ def _stiffness(record: Record, trace: TraceDescription) -> float | None:
             "is for forces, and the file has friction coefficients: give the normal force too, or "
             "the stiffness over the normal force, such as '1.6e-3 1/um'"
         )
-        raise ConfigError([Problem("", "--stiffness", message, trace.stiffness)])
+        raise ConfigError.of("--stiffness", message, trace.stiffness)
     if normal is None:
         message = "is for friction coefficients, and the file has forces: expected '1002 N/m'"
-        raise ConfigError([Problem("", "--stiffness", message, trace.stiffness)])
+        raise ConfigError.of("--stiffness", message, trace.stiffness)
     return stiffness * normal
 
 
@@ -119,7 +119,7 @@ def _check_units(record: Record, trace: TraceDescription, model: Config | None) 
     for name in ("noise", "min_fall"):
         if record.is_friction and trace.is_in(name, "N"):
             message = "the file has friction coefficients: expected a number such as 0.001"
-            raise ConfigError([Problem("", option_name(name), message, getattr(trace, name))])
+            raise ConfigError.of(option_name(name), message, getattr(trace, name))
     if record.is_friction and model is not None:
         message = "is for forces, and the file has friction coefficients: give --normal-force too"
-        raise ConfigError([Problem("", "--config", message)])
+        raise ConfigError.of("--config", message)

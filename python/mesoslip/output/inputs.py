@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar, cast
 from mesoslip.array_types import Dataset, DataTree
 from mesoslip.configuration.config import Config
 from mesoslip.configuration.reading import PathLike, as_path
-from mesoslip.errors import ConfigError, FileError, Problem, shown
+from mesoslip.errors import ConfigError, FileError, shown
 
 if TYPE_CHECKING:
     from mesoslip.output.arrays import Arrays, Tree
@@ -29,7 +29,7 @@ def as_config(config: ConfigLike, overrides: Iterable[str] = ()) -> Config:
         return Config.from_dict(config)
     if not isinstance(config, str | os.PathLike):
         message = "must be the path of a TOML file or of an output, nested tables, or a Config"
-        raise ConfigError([Problem("", "config", message, config)])
+        raise ConfigError.of("config", message, config)
     path = Path(config)
     if path.suffix == ".nc":
         # This and the following functions import netCDF only when needed, as it is slow to import.

@@ -20,7 +20,7 @@ from matplotlib.ticker import MaxNLocator
 from mesoslip.configuration import arguments
 from mesoslip.configuration.reading import PathLike, as_path
 from mesoslip.configuration.units import to_si
-from mesoslip.errors import ConfigError, FileError, Problem
+from mesoslip.errors import ConfigError, FileError
 from mesoslip.output.inputs import OutputLike, opened, several
 from mesoslip.plots.draw import draw, movie_of
 from mesoslip.plots.extent import Extent
@@ -141,7 +141,7 @@ def plot(
     if period != "auto":
         turn = None if period is None else _quantity("period", period, "s", "0.92 s")
         if turn is not None and not 0 < turn < math.inf:
-            raise ConfigError([Problem("", "period", "must be positive", period)])
+            raise ConfigError.of("period", "must be positive", period)
     options = Options(extent, _whole("snapshot", snapshot), period=turn)
     if isinstance(width, str) and width in JOURNALS:
         journal = JOURNALS[width]
@@ -156,11 +156,11 @@ def plot(
         None if style is None else as_path(style),
     )
     if width is not None and (figure is not None or ax is not None):
-        raise ConfigError([Problem("", "width", "is for a new figure", width)])
+        raise ConfigError.of("width", "is for a new figure", width)
     for key, value, method in (("figure", figure, "add_subplot"), ("ax", ax, "plot")):
         if value is not None and not hasattr(value, method):
             kind = "a figure" if key == "figure" else "axes"
-            raise ConfigError([Problem("", key, f"must be {kind} of matplotlib", value)])
+            raise ConfigError.of(key, f"must be {kind} of matplotlib", value)
     path = None if file is None else as_path(file)
     is_movie = path is not None and path.suffix.lower() in ENDINGS
     if path is not None and not is_movie:
@@ -192,7 +192,7 @@ def _quantity(key: str, value: object, unit: str, example: str) -> float:
     try:
         return to_si(value, unit, example)
     except ValueError as error:
-        raise ConfigError([Problem("", key, str(error), value)]) from None
+        raise ConfigError.of(key, str(error), value) from None
 
 
 def _number(key: str, value: object, wanted: str) -> float:
@@ -202,7 +202,7 @@ def _number(key: str, value: object, wanted: str) -> float:
             raise TypeError
         return float(value)  # type: ignore[arg-type]
     except (OverflowError, TypeError, ValueError):
-        raise ConfigError([Problem("", key, f"must be {wanted}", value)]) from None
+        raise ConfigError.of(key, f"must be {wanted}", value) from None
 
 
 def _whole(key: str, value: object) -> int | None:
@@ -211,7 +211,7 @@ def _whole(key: str, value: object) -> int | None:
             raise TypeError
         return None if value is None else operator.index(value)  # type: ignore[arg-type]
     except TypeError:
-        raise ConfigError([Problem("", key, "must be a whole number", value)]) from None
+        raise ConfigError.of(key, "must be a whole number", value) from None
 
 
 def _check_format(path: Path) -> None:

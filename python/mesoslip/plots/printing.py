@@ -103,7 +103,7 @@ def width_of(text: str, key: str) -> float:
         return text_to_si(text, "m", "8.6 cm")
     except ValueError as error:
         message = f"{error}, or the column of a journal: {', '.join(JOURNALS)}"
-        raise ConfigError([Problem("", key, message, text)]) from None
+        raise ConfigError.of(key, message, text) from None
 
 
 DEFAULT = Print()

@@ -23,7 +23,7 @@ from mesoslip.configuration.sliders.prescribed import PrescribedSlider
 from mesoslip.configuration.sliders.quasistatic import QuasistaticSlider
 from mesoslip.configuration.sliders.rigid import RigidSlider
 from mesoslip.configuration.threshold_laws import LAWS
-from mesoslip.errors import ConfigError, Problem
+from mesoslip.errors import ConfigError
 from mesoslip.quantities import with_unit
 
 MODEL = "earthquake-like model of a multicontact interface [@braun2009; @braun2011; @braun2015]"
@@ -129,7 +129,7 @@ def _lives(config: Config, *, is_slow: bool) -> str:
 @singledispatch
 def feature_sentence(feature: object, key: str, config: Config) -> str:  # noqa: ARG001
     """A sentence on the key or table that makes contacts of a kind of their own."""
-    raise ConfigError([Problem("", key, "has no sentence in reports")])
+    raise ConfigError.of(key, "has no sentence in reports")
 
 
 @feature_sentence.register

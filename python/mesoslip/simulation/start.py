@@ -13,7 +13,7 @@ import numpy as np
 
 from mesoslip.array_types import Array
 from mesoslip.configuration.kernel_parameters import Parameters
-from mesoslip.errors import ConfigError, Problem
+from mesoslip.errors import ConfigError
 from mesoslip.simulation.archive import Archive
 from mesoslip.simulation.kernel import Kernel, Progress, Words
 from mesoslip.simulation.kernel_setup import KernelSetup
@@ -103,14 +103,8 @@ def follow(config: Config, parameters: Parameters, number: int, end: End) -> tup
     """A kernel that continues another run of the same number, whose configuration may differ in the
     keys of `CONTINUED`, and its start."""
     if config.pressing.varies:
-        raise ConfigError(
-            [
-                Problem(
-                    "",
-                    "load",
-                    "must be constant in a run that continues another: its stages start with a run",
-                )
-            ]
+        raise ConfigError.of(
+            "load", "must be constant in a run that continues another: its stages start with a run"
         )
     archive = Archive(end.words)
     slider = archive.section_with("drive part")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mesoslip.array_types import Complex
-from mesoslip.errors import ConfigError, MesoslipError, Problem
+from mesoslip.errors import ConfigError, MesoslipError
 
 if TYPE_CHECKING:
     from mesoslip.configuration.config import Config
@@ -75,7 +75,7 @@ def delay_law(config: Config) -> DelayLaw:
     """The law of the delays of a configuration; a law without a theory is refused."""
     name = config.contacts.delay_law
     if name not in LAWS:
-        raise ConfigError([Problem("", "contacts.delay_law", "has no theory", name)])
+        raise ConfigError.of("contacts.delay_law", "has no theory", name)
     return LAWS[name](mean_delay(config))
 
 

@@ -20,7 +20,7 @@ from scipy import optimize
 from scipy.interpolate import BPoly
 
 from mesoslip.array_types import Array
-from mesoslip.errors import ConfigError, Problem
+from mesoslip.errors import ConfigError
 from mesoslip.theory.contacts import contact_theory
 from mesoslip.theory.lives import law_parameters, newborn_stretch, scales
 from mesoslip.theory.renewal import POINTS, solve_renewal, stretch_density
@@ -102,20 +102,15 @@ class ForceCurve:
         contacts = config.contacts
         contact_theory(config).check_force_curve()
         if contacts.newborn_width > 0 and contacts.initial == "steady":
-            raise ConfigError(
-                [
-                    Problem(
-                        "",
-                        "contacts.initial",
-                        'must be "relaxed" for a force curve with contacts.newborn_width: from the '
-                        'start "steady" the force stays at F_steady of `mesoslip info`',
-                        contacts.initial,
-                    )
-                ]
+            raise ConfigError.of(
+                "contacts.initial",
+                'must be "relaxed" for a force curve with contacts.newborn_width: from the '
+                'start "steady" the force stays at F_steady of `mesoslip info`',
+                contacts.initial,
             )
         newborn_width = newborn_stretch(config)
         if newborn_width is None:
-            raise ConfigError([Problem("", "contacts.newborn_width", WITHOUT_NEWBORN_WIDTH)])
+            raise ConfigError.of("contacts.newborn_width", WITHOUT_NEWBORN_WIDTH)
         self.newborn_width = newborn_width or config.curve.newborn_width
         self.stretch_unit = contacts.static_force / contacts.stiffness
         self.scales = scales(config, self.newborn_width)
@@ -142,17 +137,12 @@ class ForceCurve:
             begin = time.perf_counter()
             panels = math.ceil((length - start) / width)
             if panels > MAX_PANELS:
-                raise ConfigError(
-                    [
-                        Problem(
-                            "",
-                            "curve.length",
-                            f"needs {panels:.1e} steps of the spread of the breaking stretches, of "
-                            f"which there may be {MAX_PANELS:.0e}: choose a shorter curve or a "
-                            "wider threshold law",
-                            self.length,
-                        )
-                    ]
+                raise ConfigError.of(
+                    "curve.length",
+                    f"needs {panels:.1e} steps of the spread of the breaking stretches, of "
+                    f"which there may be {MAX_PANELS:.0e}: choose a shorter curve or a "
+                    "wider threshold law",
+                    self.length,
                 )
             fine = solve_renewal(parameters, start, width, panels)
             self.kernel_seconds += time.perf_counter() - begin

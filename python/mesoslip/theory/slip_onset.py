@@ -16,7 +16,7 @@ from scipy import optimize
 
 from mesoslip import _core
 from mesoslip.array_types import Array
-from mesoslip.errors import ConfigError, Problem, RunError
+from mesoslip.errors import ConfigError, RunError
 from mesoslip.output.inputs import ConfigLike, as_config
 from mesoslip.output.provenance import program_attributes
 from mesoslip.output.variables import ONSET
@@ -165,16 +165,14 @@ def onset(config: ConfigLike) -> xr.DataTree:
     slider = config.slider.oscillator
     if slider is None:
         kind = config.slider.kind
-        raise ConfigError([Problem("", "slider.kind", "must be rigid for the onset of slip", kind)])
+        raise ConfigError.of("slider.kind", "must be rigid for the onset of slip", kind)
     curve = ForceCurve(config)
     if curve.is_sampled:
         message = "has no onset: S46 needs derivatives of the density, which samples do not give"
-        raise ConfigError(
-            [Problem("", "contacts.threshold.law", message, config.contacts.threshold.law)]
-        )
+        raise ConfigError.of("contacts.threshold.law", message, config.contacts.threshold.law)
     summary = curve.summary()
     if summary["D1"] is None:
-        raise ConfigError([Problem("", "drive", "must move for the onset of slip")])
+        raise ConfigError.of("drive", "must move for the onset of slip")
     attributes = program_attributes(config, "onset") | {
         name: value for name, value in summary.items() if value is not None
     }

@@ -14,7 +14,7 @@ import numpy as np
 import xarray as xr
 
 from mesoslip.array_types import Array
-from mesoslip.errors import ConfigError, Problem
+from mesoslip.errors import ConfigError
 from mesoslip.output.provenance import program_attributes
 from mesoslip.output.variables import STEADY
 from mesoslip.theory.contacts import contact_theory
@@ -123,7 +123,7 @@ def _centre(config: Config) -> float:
         velocity = contact_theory(config).creep_velocity(config.drive.first_force)
         if math.isfinite(velocity):
             return velocity
-    raise ConfigError([Problem("", "drive.velocity", "steady sliding needs a velocity")])
+    raise ConfigError.of("drive.velocity", "steady sliding needs a velocity")
 
 
 def _critical(sliding: LinearStability) -> float:

@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mesoslip.array_types import Array
-from mesoslip.errors import ConfigError, Problem
+from mesoslip.errors import ConfigError
 from mesoslip.theory.contacts import contact_theory
 from mesoslip.theory.sliders import row_scales
 
@@ -88,10 +88,10 @@ class SteadyFront:
         scales = row_scales(config.slider, config)
         if scales is None:
             message = 'fronts run along the blocks of slider.kind = "interface", two or more'
-            raise ConfigError([Problem("", "slider.kind", message, config.slider.kind)])
+            raise ConfigError.of("slider.kind", message, config.slider.kind)
         if not config.pressing.is_uniform:
             message = "a steady front needs the same strength of all blocks: leave it out"
-            raise ConfigError([Problem("", "load.profile", message)])
+            raise ConfigError.of("load.profile", message)
         contact_theory(config).check_steady_front()
         self.sound_velocity = scales.sound_velocity
         self._contacts, self._top, self._edge = scales.contacts, scales.top, scales.edge

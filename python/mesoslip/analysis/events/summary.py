@@ -15,7 +15,7 @@ from mesoslip.analysis.events.laws import BValue, Omori, b_value, omori
 from mesoslip.array_types import Array
 from mesoslip.configuration import arguments
 from mesoslip.configuration.arguments import check_choice
-from mesoslip.errors import ConfigError, FileError, Problem
+from mesoslip.errors import ConfigError, FileError
 from mesoslip.output.access import group_of
 from mesoslip.output.arrays import Tree
 from mesoslip.output.inputs import OutputLike, opened_run_arrays
@@ -165,7 +165,7 @@ def events_of(
         catalogue = "channel" if CHANNEL in tree.data_vars else catalogue
     if threshold is not None and catalogue != "channel":
         message = f"is that of the channel, and these events are {catalogue}"
-        raise ConfigError([Problem("", "threshold", message, threshold)])
+        raise ConfigError.of("threshold", message, threshold)
     emissions = None
     times = tree.to_dataset()["time"].values
     record = float(times[-1] - times[0])

@@ -31,7 +31,7 @@ from mesoslip.configuration.table import (
     Whole,
     choice,
 )
-from mesoslip.errors import ConfigError, Problem
+from mesoslip.errors import ConfigError
 
 # Methods of integration.
 SOLVERS = ("series", "adams", "bdf")
@@ -178,7 +178,7 @@ class LayeredSlider(SpringSlider):
                 "needs CVODE, but this copy of mesoslip was built without SUNDIALS; "
                 'use method = "series"'
             )
-            raise ConfigError([Problem("", "slider.solver.method", message, solver)])
+            raise ConfigError.of("slider.solver.method", message, solver)
         relative = self.solver.relative_tolerance
         base = self.base
         return {

@@ -45,7 +45,7 @@ def view_of(tree: DataTree, name: str | None, options: Options) -> View:
             raise FileError(f"the output is {KINDS[kind].description}: it has no view {name!r}")
         choice = ", ".join(names_of_views(kind))
         text = f"no such view of {KINDS[kind].description}; choose from {choice}"
-        raise ConfigError([Problem("", "view", text, name)])
+        raise ConfigError.of("view", text, name)
     view = next((one for one in there if one.applies(tree)), there[0])
     unknown = options.given - view.options
     if unknown:

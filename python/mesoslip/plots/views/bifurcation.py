@@ -13,7 +13,7 @@ from mesoslip.array_types import DataTree
 from mesoslip.configuration.config import Config
 from mesoslip.configuration.differences import flat, is_bookkeeping
 from mesoslip.configuration.keys import key_kind
-from mesoslip.errors import ConfigError, Problem
+from mesoslip.errors import ConfigError
 from mesoslip.plots.axis import logarithmic
 from mesoslip.plots.key_names import name_of
 from mesoslip.plots.style import BLUE
@@ -65,7 +65,7 @@ def _differing_key(tables: Sequence[dict[str, object]]) -> str:
     if len(keys) != 1:
         found = ", ".join(keys) or "none"
         text = "needs runs that differ in one number of the apparatus"
-        raise ConfigError([Problem("", "--view bifurcation", text, found)])
+        raise ConfigError.of("--view bifurcation", text, found)
     return keys[0]
 
 

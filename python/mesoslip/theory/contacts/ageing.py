@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from mesoslip.configuration.contacts.ageing import ageing_of
-from mesoslip.errors import ConfigError, Problem
+from mesoslip.errors import ConfigError
 from mesoslip.theory.contacts.ageing_lives import lives, quadrature, steady_force
 from mesoslip.theory.contacts.base import ContactTheory
 from mesoslip.theory.quantity import Quantity, named_quantities
@@ -51,7 +51,7 @@ class AgeingTheory(ContactTheory):
         return True
 
     def check_force_curve(self) -> None:
-        raise ConfigError([Problem("", "contacts.ageing", NO_FORCE_CURVE)])
+        raise ConfigError.of("contacts.ageing", NO_FORCE_CURVE)
 
     def sliding(self, velocity: float | None = None) -> LinearStability:
         from mesoslip.theory.contacts.ageing_sliding import AgeingSliding

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, ClassVar, NoReturn
 
 from mesoslip.array_types import DataTree
-from mesoslip.errors import ConfigError, Problem
+from mesoslip.errors import ConfigError
 from mesoslip.quantities import with_unit
 from mesoslip.theory.quantity import Quantity, named_quantities
 
@@ -122,7 +122,7 @@ class ContactTheory:
             message = f"has {missing} together with {' and '.join(others)}: leave one of them out"
         else:
             message = f"has {missing}: leave it out"
-        raise ConfigError([Problem("", key or "contacts", message)])
+        raise ConfigError.of(key or "contacts", message)
 
     @property
     def K_star_estimate(self) -> float:  # noqa: N802

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from mesoslip.errors import ConfigError, Problem
+from mesoslip.errors import ConfigError
 from mesoslip.theory.contacts.base import ContactTheory
 from mesoslip.theory.delays import drag_impulse
 from mesoslip.theory.lives import newborn_stretch, scales
@@ -35,7 +35,7 @@ class PlainTheory(ContactTheory):
     def check_steady_front(self) -> None:
         if self.config.contacts.reattach:
             message = "contacts that attach again have no steady fronts: set it to false"
-            raise ConfigError([Problem("", "contacts.reattach", message, True)])
+            raise ConfigError.of("contacts.reattach", message, True)
 
     def sliding(self, velocity: float | None = None) -> LinearStability:
         from mesoslip.theory.contacts.plain_sliding import SteadySliding

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from mesoslip.array_types import Array
 from mesoslip.configuration.contacts.thermal import thermal_of
-from mesoslip.errors import ConfigError, Problem
+from mesoslip.errors import ConfigError
 from mesoslip.theory.contacts.base import ContactTheory
 from mesoslip.theory.contacts.thermal_lives import ThermalAgeingLives, ThermalLives
 from mesoslip.theory.quantity import Quantity, named_quantities
@@ -69,7 +69,7 @@ class ThermalTheory(ContactTheory):
         return True
 
     def check_force_curve(self) -> None:
-        raise ConfigError([Problem("", "contacts.thermal", NO_FORCE_CURVE)])
+        raise ConfigError.of("contacts.thermal", NO_FORCE_CURVE)
 
     def sliding(self, velocity: float | None = None) -> ThermalSliding:
         from mesoslip.theory.contacts.thermal_sliding import ThermalSliding

@@ -29,7 +29,7 @@ from mesoslip.configuration.table import (
     choice,
     problem,
 )
-from mesoslip.errors import ConfigError, Problem
+from mesoslip.errors import ConfigError
 from mesoslip.quantities import with_unit
 
 # Choices, by the names that the kernels use.
@@ -171,8 +171,7 @@ class Contacts(Table):
     def needed_track(self) -> Track:
         """The track; an error if there is none."""
         if self.track is None:
-            message = "missing: the strength is the same everywhere"
-            raise ConfigError([Problem("", "contacts.track", message)])
+            raise ConfigError.of("contacts.track", "missing: the strength is the same everywhere")
         return self.track
 
     @property

@@ -1,35 +1,27 @@
 """Kill runs of all kinds at random moments, resume them, and compare every byte.
 
-Usage: kill.py [KILLS] [--scale FACTOR] [--tally FILE]. Half of the kills are of runs that had been
-resumed. Of each kind it is checked that
+Half of the kills are of runs that had been resumed. Of each kind it is checked that
 
 - the output is to the bit that of a run that was not killed,
 - a kill costs no more than what came after the last checkpoint,
 - nothing but the output remains.
 
-Prints a line for each kind; exit status 0 if nothing was wrong. A short version is in
-tests/python/test_resume.py, and tests/resume/kill_all.py kills sweeps and fits as well.
+A short version is in tests/python/test_resume.py.
 """
 
 import json
-import os
-import sys
 import tempfile
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "python"))
-sys.path.insert(0, str(Path(__file__).parents[1] / "fuzz"))
-
 from apart import Command
 from conftest import klein_tables
 from invariants import differences
 from kinds import AGEING, BASE, COARSE, FORCE, LAYERED, NEWBORN, RANDOM, THERMAL
 from mesoslip import Config
 from mesoslip.simulation.checkpoint import PREVIOUS, STATE, checkpoint_folder
-from tally import Tally, arguments
+from tally import Tally
 from test_resume import read_whole
 
 # Runs that take some seconds, so that there is time to be killed; a fast drive, so that much
@@ -74,20 +66,10 @@ MAX_SECONDS = 600.0
 def attack(
     kind: str, kills: int, folder: Path, random: np.random.Generator, *, scale: float = 1.0
 ) -> Tally:
-    """Kill a run so many times at least, again and again from the beginning.
+    """Kill a run of a kind so many times at least, again and again from the beginning.
 
-    Parameters
-    ----------
-    kind
-        One of `KINDS`.
-    kills
-        Least number of kills of runs that start, and of runs that were resumed.
-    folder
-        An empty one; what the runs print is written beside it.
-    random
-        Gives the moments.
-    scale
-        Factor of the durations.
+    Of runs that start and of runs that were resumed there are as many kills; the random numbers
+    give the moments. The folder is empty, and what the runs print is written beside it.
     """
     changes = LONG | KINDS[kind]
     changes["run__duration"] *= scale
@@ -155,13 +137,3 @@ def attack_all(kills: int, random: np.random.Generator, *, scale: float = 1.0) -
             total.add(attack(kind, -(-kills // (2 * len(KINDS))), folder, random, scale=scale))
         print(f"{kind:24} {total}", flush=True)
     return total
-
-
-def main() -> None:
-    given = arguments(__doc__, 200)
-    random = np.random.default_rng(int(os.environ.get("SEED", "1")))
-    attack_all(given.kills, random, scale=given.scale).end(given.tally)
-
-
-if __name__ == "__main__":
-    main()

@@ -251,7 +251,7 @@ def test_smooth_sliding_and_irregular_motion_are_told_apart():
     assert smooth.smooth_stable
     assert smooth.amplitude == 0
     assert "smooth sliding" in smooth.verdict
-    irregular = mesoslip.cycle(configuration("slider.damping_ratio=0.19", LONG_STEPS))
+    irregular = mesoslip.cycle(configuration("slider.damping_ratio=0.2", LONG_STEPS))
     assert irregular.motion == "irregular"
     assert irregular.spread > 0.02
     assert sum(irregular.durations) < irregular.followed

@@ -36,9 +36,9 @@ module mesoslip_contacts_populations_offer
    !> Duration of a step of resolution 1 over the time in which an inertial slider oscillates by a
    !> radian or is damped
    real(wp), parameter :: rate_part = 1.0_wp
-   !> Maximum of it. A rigid slider advances little farther at once, and the chord of a step is
-   !> wrong if it ends before it was expected to
-   real(wp), parameter :: max_phase = 0.475_wp
+   !> Duration of an advance over that of a step: the chord of a step is wrong if the slider ends it
+   !> before it was expected to
+   real(wp), parameter :: phase_part = 1.25_wp
    !> Breaks of populations that start to break together, beyond which a step ends where they do,
    !> over those of populations that start anywhere in it
    real(wp), parameter :: together_part = 1.0e-4_wp
@@ -127,6 +127,7 @@ contains
       if (self%max_fall_time < max_time) then
          window%end_time = min(window%end_time, time_after(pose%time, self%max_fall_time))
       end if
+      window%max_phase = max(window%max_phase, phase_part * rate_part * self%resolution)
       window%upper = max(self%pinned%ahead, pose%displacement)
       window%lower = min(self%pinned%behind, pose%displacement)
       if (moves) then
@@ -274,7 +275,7 @@ contains
 
       rate = self%oscillation_rate(pose) + 2.0_wp * pose%damping
       duration = huge(1.0_wp)
-      if (rate > 1.0_wp / max_time) duration = min(self%resolution * rate_part, max_phase) / rate
+      if (rate > 1.0_wp / max_time) duration = self%resolution * rate_part / rate
    end function max_duration
 
    !> Add to a law the changes of the force by breaks and attachments in a step.

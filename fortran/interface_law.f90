@@ -34,6 +34,9 @@ module mesoslip_interface_law
       real(wp) :: lower = -huge(1.0_wp)
       !> Time at which the law ends [s]
       real(wp) :: end_time = huge(1.0_wp)
+      !> Maximum duration of an advance by a series, over the time in which the slider oscillates by
+      !> a radian or is damped
+      real(wp) :: max_phase = 0.5_wp
    end type window_type
 
    !> Time and motion of a slider.

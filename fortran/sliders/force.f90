@@ -19,10 +19,9 @@ module mesoslip_sliders_force
 
    public :: slider_force_type, make_slider_force
 
-   !> Terms of the series, and maximum length of a step in units of the fastest rate: the terms left
-   !> out are less than 1e-16 of the first ones.
+   !> Terms of the series: those left out are less than 1e-16 of the first ones in a step of half a
+   !> radian
    integer, parameter :: terms = 17
-   real(wp), parameter :: max_step = 0.5_wp
    !> Points of the rule for the losses of a step
    integer, parameter :: nodes = 6
 
@@ -200,8 +199,8 @@ contains
       rate = sqrt(abs(self%law%stiffness) * self%inverse_mass) &
          & + self%law%drag * self%inverse_mass + self%damping
       step = window%end_time - self%time
-      ends = step * rate <= max_step
-      if (.not. ends) step = max_step / rate
+      ends = step * rate <= window%max_phase
+      if (.not. ends) step = window%max_phase / rate
       call forget_rounding(self)
       call expand(self)
       change = 0.0_wp

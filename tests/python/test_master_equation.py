@@ -407,6 +407,52 @@ def test_estimated_errors_are_those_of_a_run(klein, changes):
         assert run.slip_time_error == 0
 
 
+@pytest.mark.parametrize(
+    ("contacts", "slider", "velocity", "duration", "spread"),
+    [
+        # Contacts that broke before break together when the slider comes back, in its third slip
+        # and its second one.
+        (("weibull", 0.142, "scaled", "steady", 4.9e-4, 0.244), (188, 0.48), 2.47e-6, 0.08, 4e-6),
+        (("weibull", 0.138, "equal", "steady", 3.1e-4, 0.348), (42.8, 0.16), 1.93e-6, 0.27, 6e-5),
+        # Steps longer than a series of the slider reached, above resolution 0.39.
+        (
+            ("gaussian", 0.0763, "scaled", "uniform", 3.63e-4, 0.41),
+            (42.9, 0.59),
+            1.06e-6,
+            0.58,
+            2e-5,
+        ),
+        # A kink of the initial density, at the lowest threshold.
+        (("uniform", 0.25, "equal", "uniform", 3e-3, 0.486), (444, 0.066), 3.8e-6, 0.017, 8e-6),
+    ],
+)
+def test_errors_of_slip_times_do_not_depend_on_accidents(
+    klein, contacts, slider, velocity, duration, spread
+):
+    """The error of the last slip over the squared resolution, as steps become a little longer."""
+    law, width, coupling, initial, delay, back_force = contacts
+    last = {}
+    for resolution in (0.125, 0.25, 0.3, 0.35, 0.42, 0.46, 0.5):
+        config = klein(
+            run__engine="me",
+            run__resolution=resolution,
+            run__duration=duration,
+            drive__velocity=velocity,
+            slider__stiffness=slider[0],
+            slider__damping_ratio=slider[1],
+            contacts__threshold={"law": law, "relative_width": width},
+            contacts__coupling=coupling,
+            contacts__initial=initial,
+            contacts__delay=delay,
+            contacts__back_force_ratio=back_force,
+            output__interval=duration,
+        )
+        last[resolution] = finish(config, estimates_errors=False).slips[-1, 1]
+    fine = last.pop(0.125)
+    errors = [(time - fine) / (one**2 - 0.125**2) for one, time in last.items()]
+    assert np.ptp(errors) < spread
+
+
 def test_segments_do_not_matter(klein):
     """The same numbers to the bit, also when the arrays grow on the way."""
     config = klein(run__engine="me", run__duration=2.2, output__slip_interval=1e-4)

@@ -183,7 +183,8 @@ def test_without_temperature_it_is_the_model_without():
 def test_energy_is_balanced(changes):
     config = configuration("rigid, thermal", run__engine="me", run__resolution=1.0, **changes)
     tree = mesoslip.run(config)
-    assert abs(float(tree["energy_residual"].item())) < 1e-8
+    # Steps of a radian: the work on contacts that attach is by a polynomial of fourth order.
+    assert abs(float(tree["energy_residual"].item())) < 3e-8
     assert float(tree["detached_contacts"].max()) <= 48 * (1 + 1e-12)
 
 

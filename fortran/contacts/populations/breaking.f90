@@ -42,8 +42,9 @@ module mesoslip_contacts_populations_breaking
       !> Sums over the breaks: contacts, mass, work that the breaks save [J], and force that the
       !> contacts would bear at the end [N]
       real(wp) :: breaks = 0.0_wp, mass = 0.0_wp, work = 0.0_wp, drop = 0.0_wp
-      !> Stiffness of the contacts that break [N/m]
-      real(wp) :: stiffness = 0.0_wp
+      !> Stiffness of the contacts that break [N/m], and breaks of populations that start to break
+      !> at one place in the motion
+      real(wp) :: stiffness = 0.0_wp, together = 0.0_wp
       !> The same of contacts that reach their thresholds, which break with the displacement; the
       !> others break with the time
       real(wp) :: cut_breaks = 0.0_wp, cut_work = 0.0_wp, cut_drop = 0.0_wp
@@ -246,6 +247,9 @@ contains
                end if
             end if
          end do
+         trial%together = 0.0_wp
+         if (late > max_breaks) trial%together = breaks_from(onset)
+         if (.not. trial%together > max_breaks) trial%together = 0.0_wp
          trial%breaks = breaks
          trial%mass = mass
          trial%stiffness = stiffness * self%parameters%stiffness
@@ -255,6 +259,25 @@ contains
          trial%cut_work = trial%work
          trial%cut_drop = trial%drop
       end associate
+
+   contains
+
+      !> Breaks of the populations that start to break at a displacement [m].
+      pure function breaks_from(start) result(breaks)
+         real(wp), intent(in) :: start
+         real(wp) :: breaks
+
+         integer :: one
+
+         breaks = 0.0_wp
+         do one = 1, self%trial%count
+            associate (row => self%trial%population(one))
+               if (abs(self%population(row, column) - start) <= self%near_gap()) breaks = breaks &
+                  & + (self%left(number, row) - self%trial%moments(number, one))
+            end associate
+         end do
+      end function breaks_from
+
    end subroutine sum_breaks
 
    !> Energy of the contacts of a population that break beyond that of their configured thresholds,

@@ -34,8 +34,14 @@ module mesoslip_contacts_populations_offer
    !> Relative difference of forces up to which they are equal except for rounding
    real(wp), parameter :: rounding = 16.0_wp * epsilon(1.0_wp)
    !> Duration of a step of resolution 1 over the time in which an inertial slider oscillates by a
-   !> radian
+   !> radian or is damped
    real(wp), parameter :: rate_part = 1.0_wp
+   !> Duration of an advance over that of a step: the chord of a step is wrong if the slider ends it
+   !> before it was expected to
+   real(wp), parameter :: phase_part = 1.25_wp
+   !> Breaks of populations that start to break together, beyond which a step ends where they do,
+   !> over those of populations that start anywhere in it
+   real(wp), parameter :: together_part = 1.0e-4_wp
    !> Maximum of the next step over the last one, and ratio of the lengths among which it is
    real(wp), parameter :: max_growth_of_step = 2.0_wp, ratio = 2.0_wp**0.25_wp
    !> Bend over that of the tolerance beyond which a step is shortened, and how often it may be
@@ -121,6 +127,7 @@ contains
       if (self%max_fall_time < max_time) then
          window%end_time = min(window%end_time, time_after(pose%time, self%max_fall_time))
       end if
+      window%max_phase = max(window%max_phase, phase_part * rate_part * self%resolution)
       window%upper = max(self%pinned%ahead, pose%displacement)
       window%lower = min(self%pinned%behind, pose%displacement)
       if (moves) then
@@ -266,7 +273,7 @@ contains
 
       real(wp) :: rate
 
-      rate = self%oscillation_rate(pose)
+      rate = self%oscillation_rate(pose) + 2.0_wp * pose%damping
       duration = huge(1.0_wp)
       if (rate > 1.0_wp / max_time) duration = self%resolution * rate_part / rate
    end function max_duration
@@ -378,8 +385,9 @@ contains
 
    !> Find what breaks in a displacement of the slider [m].
    !>
-   !> Where many populations start to break together, as they do where the slider turned before, the
-   !> force has a kink: the displacement ends there, which is then the limit of the step [m].
+   !> Where populations start to break together, as they do where the slider turned before, or many
+   !> start to break, the force has a kink: the displacement ends there, which is then the limit of
+   !> the step [m]. Errors of steps with a kink would depend on where in them it happens to be.
    subroutine try(self, pose, direction, distance, limit)
       class(population_state_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
@@ -390,7 +398,8 @@ contains
 
       call self%pinned%try(pose, pose%displacement + direction * distance, &
          & expected_time(distance), direction, late, onset, self%failure)
-      if (late > self%max_late) then
+      if (late > self%max_late &
+         & .or. self%pinned%trial%together > together_part * self%max_late) then
          wanted = distance
          displacement = onset
          distance = abs(displacement - pose%displacement)

@@ -332,11 +332,9 @@ contains
    end subroutine expect
 
    !> Take out all contacts that are due to attach.
-   subroutine take_due(self, before, after, spreads, births, moment, square, when, held)
+   subroutine take_due(self, before, after, births, moment, square, when, held)
       class(detached_packets_type), intent(inout) :: self
       type(pose_type), intent(in) :: before, after
-      !> Whether the displacements are those of two times, not of the mean time
-      logical, intent(in) :: spreads
       !> Their number, and sums over them of the displacement in the motion at which they attach
       !> [m], of its square [m2], and of the time [s]
       real(wp), intent(out) :: births, moment, square, when
@@ -368,8 +366,7 @@ contains
             births = births + more
             if (allocated(self%mix)) held = held + more * self%mix(:, self%first)
             ! Two points with the mean and about the variance of the times.
-            spread = 0.0_wp
-            if (spreads) spread = (packet(row_end) - packet(row_start)) * (part - part_before) &
+            spread = (packet(row_end) - packet(row_start)) * (part - part_before) &
                & / sqrt(12.0_wp)
             distance = position_at(before, after, when_more + [-spread, spread]) &
                & - before%displacement

@@ -26,6 +26,8 @@ module mesoslip_contacts_populations_pinned
    real(wp), parameter :: track_part = 0.4_wp
    !> Stretch beyond which the cells of the initial states of wide laws grow with it
    real(wp), parameter :: min_even = 0.02_wp
+   !> Part of a cell that is no cell of its own
+   real(wp), parameter :: tiny_part = 1.0e-6_wp
    !> Maximum length of a step in which the force hardly bends: over that by the resolution, over
    !> the spread of the breaking stretches, and over the resolution times the stretch in a life
    real(wp), parameter :: max_growth = 4.0_wp, max_part = 0.9_wp, max_stretch_part = 0.02_wp
@@ -262,31 +264,41 @@ contains
       !> Set if there is not enough memory
       type(error_type), allocatable, intent(inout) :: error
 
-      real(wp) :: max_distance, cell, middle, edge, even, reached
+      real(wp) :: bound(0:2), left, cell, middle, edge, even, reached
+      integer :: part
 
       associate (coupling => self%parameters%coupling)
+         ! Where contacts start to break their number may have a kink: a cell ends there.
+         bound = 0.0_wp
          if (self%has_table) then
-            max_distance = self%table_lives%longest(moments)
+            bound(1:) = [max(0.0_wp, self%table_lives%shortest(moments, 1.0_wp)), &
+               & self%table_lives%longest(moments)]
          else
-            max_distance = self%factor * breaking_distance(coupling, force / self%factor, &
-               & self%moments(1)%max_threshold)
+            bound(1:) = max(0.0_wp, self%factor * breaking_distance(coupling, &
+               & force / self%factor, [self%moments(1)%min_threshold, &
+               & self%moments(1)%max_threshold]))
          end if
-         edge = 0.0_wp
          even = 1.0_wp
          if (self%parameters%law%width > max_spread) even = min_even
-         do while (edge < max_distance .and. .not. allocated(error))
-            ! The tails of wide laws are spread over many stretches, and smooth; many of their
-            ! thresholds are small.
-            cell = min(self%step / self%stretch * max(even, edge), max_distance - edge)
-            middle = edge + 0.5_wp * cell
-            edge = edge + cell
-            reached = middle
-            if (.not. self%has_table) then
-               reached = max(broken, broken_threshold(coupling, force / self%factor, &
-                  & middle / self%factor))
-            end if
-            call self%add(-middle * self%stretch, force, self%factor, share * cell, moments, &
-               & reached, 0.0_wp, -self%ageing%initial_age, 0.0_wp, error)
+         do part = 1, 2
+            edge = bound(part - 1)
+            do while (edge < bound(part) .and. .not. allocated(error))
+               ! The tails of wide laws are spread over many stretches, and smooth; many of their
+               ! thresholds are small.
+               cell = self%step / self%stretch * max(even, edge)
+               left = bound(part) - edge
+               cell = left / max(1, ceiling(left / cell - tiny_part))
+               middle = edge + 0.5_wp * cell
+               edge = edge + cell
+               if (.not. cell < left) edge = bound(part)
+               reached = middle
+               if (.not. self%has_table) then
+                  reached = max(broken, broken_threshold(coupling, force / self%factor, &
+                     & middle / self%factor))
+               end if
+               call self%add(-middle * self%stretch, force, self%factor, share * cell, moments, &
+                  & reached, 0.0_wp, -self%ageing%initial_age, 0.0_wp, error)
+            end do
          end do
       end associate
    end subroutine add_sliding

@@ -15,6 +15,8 @@ module mesoslip_contacts_populations_respond
    !> Duration of a step over the time in which the slider oscillates by a radian, beyond which its
    !> motion counts as uniform
    real(wp), parameter :: even_time = 1.5_wp
+   !> Maximum part of a motion after which breaks start
+   real(wp), parameter :: max_start = 0.99_wp
 
 contains
 
@@ -55,6 +57,7 @@ contains
       type(pose_type), intent(in) :: before, after
 
       real(wp), allocatable :: held(:)
+      real(wp) :: start_time, growth
 
       allocate (held(0))
       if (allocated(self%pinned%mix)) held = self%pinned%tried_mix()
@@ -62,29 +65,33 @@ contains
       associate (trial => self%pinned%trial)
          self%breaks = self%breaks + trial%breaks
          call self%step_work%add(trial%work)
-         call self%detached%add(before%time, after%time, trial%breaks, trial%mass, &
-            & growth_of_breaks(self, before, after), held, self%failure)
+         call find_rate_of_breaks(self, before, after, start_time, growth)
+         call self%detached%add(start_time, after%time, trial%breaks, trial%mass, growth, held, &
+            & self%failure)
       end associate
    end subroutine detach_tried
 
-   !> Half the change of the rate of breaks in a motion over the mean rate, from -1 to 1. Contacts
-   !> that reach their thresholds break as fast as the slider moves, in long steps by where they
-   !> break on average, as the work says that their breaks save; by activation evenly in time.
-   pure function growth_of_breaks(self, before, after) result(growth)
+   !> Time at which breaks in a motion start [s], and half the change of their rate from then on
+   !> over the mean rate, from -1 to 1. Contacts that reach their thresholds break as the slider
+   !> moves, and by where they break on average, as the work says that their breaks save; by
+   !> activation evenly in time. A rate that grows from 0 starts later where most break late.
+   pure subroutine find_rate_of_breaks(self, before, after, start_time, growth)
       class(population_state_type), intent(in) :: self
       type(pose_type), intent(in) :: before, after
-      real(wp) :: growth
+      real(wp), intent(out) :: start_time, growth
 
+      start_time = before%time
       growth = 0.0_wp
       if (self%pinned%is_thermal) return
       associate (twice_mean => before%velocity + after%velocity, trial => self%pinned%trial)
          if (trial%direction * twice_mean > 0.0_wp) then
-            growth = (after%velocity - before%velocity) / twice_mean
-            if (self%pinned%adapts) growth = growth + trial%growth()
+            growth = (after%velocity - before%velocity) / twice_mean + trial%growth()
+            if (growth > 1.0_wp) start_time = before%time &
+               & + min(max_start, 0.5_wp * (growth - 1.0_wp)) * (after%time - before%time)
             growth = max(-1.0_wp, min(1.0_wp, growth))
          end if
       end associate
-   end function growth_of_breaks
+   end subroutine find_rate_of_breaks
 
    !> Break contacts whose thresholds fell to forces against the direction of motion.
    subroutine break_fallen(self, before, after)
@@ -203,8 +210,7 @@ contains
       real(wp), allocatable :: held(:)
 
       allocate (held(self%bins()), source=0.0_wp)
-      call self%detached%take_due(before, after, self%pinned%adapts, births, moment, square, &
-         & when, held)
+      call self%detached%take_due(before, after, births, moment, square, when, held)
       if (.not. births > 0.0_wp) return
       if (size(held) > 0) self%pinned%newborn_mix = held / births
 

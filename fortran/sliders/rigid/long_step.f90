@@ -12,8 +12,8 @@ module mesoslip_sliders_rigid_long_step
 
    public :: take_long_step
 
-   !> Lengths of middling, long and the longest steps in units of the fastest rate
-   real(wp), parameter :: middling_step = 3.5e-2_wp, long_step = 8.0e-2_wp, max_step = 0.5_wp
+   !> Lengths of middling and long steps in units of the fastest rate
+   real(wp), parameter :: middling_step = 3.5e-2_wp, long_step = 8.0e-2_wp
 
    !> Gauss-Legendre points and weights on [0, 1], for the losses in middling steps.
    integer, parameter :: max_nodes = 6
@@ -40,8 +40,8 @@ contains
 
       rate = sqrt(abs(system%stiffness)) + system%drag + 2.0_wp * self%damping
       step = window%end_time - self%time
-      ends = step * rate <= max_step
-      if (.not. ends) step = max_step / rate
+      ends = step * rate <= window%max_phase
+      if (.not. ends) step = window%max_phase / rate
       ! Most steps end at a break: a longer series is not needed.
       if (self%velocity > 0.0_wp) then
          gap = window%upper - self%displacement

@@ -162,6 +162,8 @@ MAX_DEVIATION = 0.1
 MIN_SAMPLES = 16
 # Minimum transient change that is evaluated, in standard errors.
 MIN_TRANSIENT = 3.0
+# The same over the whole change of the force: less may be due to the steps of a master equation.
+MIN_TRANSIENT_PART = 1e-3
 
 
 class LoadStep(NamedTuple):
@@ -253,7 +255,9 @@ def _row(experiment: Experiment, number: int, stage: Stage, step: LoadStep) -> d
         }
     if experiment.is_stick_slip(stage):
         notes.append("stick-slip: the force is not that of sliding")
-    elif abs(after.mean - start) < MIN_TRANSIENT * transient_error:
+    elif abs(after.mean - start) < max(
+        MIN_TRANSIENT * transient_error, MIN_TRANSIENT_PART * abs(after.mean - before.mean)
+    ):
         notes.append("no transient above the noise")
     else:
         notes += _fill_distances(experiment, stage, step, start, after.mean, row)

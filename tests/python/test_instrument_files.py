@@ -145,6 +145,7 @@ def test_a_lone_load_cell_pulls(tmp_path):
     for names, quantity in (
         ("Time (s)\tStage (um)\tLoad cell (mN)", "spring_force"),
         ("Time (s)\tStage (um)\tFriction force (mN)\tLoad cell (mN)", "normal_force"),
+        ("Time (s)\tNormal force (N)\tLoad cell (mN)", "spring_force"),
     ):
         path = tmp_path / f"{quantity}.txt"
         columns = table[:, : names.count("\t") + 1]

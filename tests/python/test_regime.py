@@ -60,6 +60,21 @@ def test_noise_of_steady_contacts_is_smooth(klein):
     assert result(klein(contacts__count=10_000), force).regime != SMOOTH
 
 
+@pytest.mark.parametrize(("number", "regime"), [(0, SMOOTH), (1, TRANSIENT), (3, IRREGULAR)])
+def test_rare_deep_slips_are_not_smooth(klein, number, regime):
+    """Though 5 and 95 % of the force do not see them."""
+    force = 1e-5 + 1e-8 * np.random.default_rng(1).normal(size=len(TIME))
+    start = 0.1 + 0.13 * np.arange(number)
+    for one in start:
+        after = (one + 0.001 <= TIME) & (one + 0.005 > TIME)
+        force[after] -= 5e-6 * (1 - (TIME[after] - one - 0.001) / 0.004)
+    before = np.full(number, 1e-5)
+    slips = Slips(start, start + 0.001, before, np.full(number, 5e-6))
+    found = result(klein(), force, slips=slips)
+    assert found.relative_amplitude < found.smooth_amplitude
+    assert found.regime == regime
+
+
 def test_a_sawtooth_is_stick_slip(klein):
     found = result(klein(), sawtooth(np.full(60, 1 / 50), np.full(60, 0.8)))
     assert found.regime == STICK_SLIP

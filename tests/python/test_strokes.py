@@ -492,6 +492,13 @@ def test_a_disc_that_turns_back_and_forth_has_strokes(tmp_path, unit, size) -> N
     unit_length = 0.25 * math.tau * 0.02
     stiffness = found.overall["stiffness"]
     assert stiffness.mean == pytest.approx(20 / unit_length, abs=4 * stiffness.error)
+    # By the speed of rotation, whose sign changes.
+    speed = np.gradient(0.25 * x, phases())
+    header = "time [s],rotation speed [rev/s],friction force [N]"
+    rows = np.transpose([phases(), speed, force])
+    np.savetxt(tmp_path / "speed.csv", rows, delimiter=",", header=header, comments="")
+    found = strokes_of(mesoslip.read_trace(tmp_path / "speed.csv", radius="20 mm"))
+    np.testing.assert_allclose(found.columns["strokes"]["length"], lengths, rtol=0.01)
     guessed = mesoslip.read_trace(file)
     assert "strokes by it need a --radius" in guessed.attrs["understood"]
     assert strokes_of(guessed).source == "sign of the force"

@@ -307,8 +307,8 @@ def _from_headings(table: Table, headings: Mapping[int, Heading], found: Assignm
     }
     loads = [index for index, name in names.items() if name in {"load", "load cell"}]
     is_normal = has_force or bool(set(FORCES) & by_quantity.keys())
-    if len(loads) == 1 and "normal_force" not in by_quantity:
-        # Beside a friction it presses, alone it pulls.
+    if len(loads) == 1 and not (is_normal and "normal_force" in by_quantity):
+        # Beside a friction it presses, alone or beside a normal force it pulls.
         (index,) = loads
         quantity, why = ("normal_force", "beside") if is_normal else ("force", "without")
         what = quantity.replace("_", " ")

@@ -137,6 +137,8 @@ def read_record(paths: Sequence[Path], trace: TraceDescription) -> Record:
     for name, one in kept.items():
         if count := int(np.isnan(one).sum()):
             notes.append(f"{_in_words(name)}: missing in {count} samples")
+    radius = _radius(values, trace)
+    notes += _turned(order.time, kept, radius[picked] if isinstance(radius, np.ndarray) else radius)
     if inside.sum() < len(inside):
         outside = int((~inside).sum())
         notes.append(f"left out, before start or after end: {outside} of {inside.size}")
@@ -282,29 +284,36 @@ def _complete(values: dict[str, Array], made: Force, trace: TraceDescription) ->
             f"sliding speed: 2 pi x radius ({_mean(radius, 'm')}) x rotation speed, "
             f"{_range(values['sliding_speed'], 'sliding_speed')}"
         )
-    if "revolutions" in values:
-        lines += _turned(values, radius)
     return lines
 
 
-def _turned(values: dict[str, Array], radius: Array | float | None) -> list[str]:
+def _turned(time: Array, kept: dict[str, Array], radius: Array | float | None) -> list[str]:
     """Unwrap an angle that starts again after each revolution, and make a rotation back and forth
     the motion of a load point; lines about it."""
-    turned = values["revolutions"]
-    known = np.isfinite(turned)
-    if known.any() and np.ptp(turned[known]) <= 1 and np.abs(np.diff(turned[known])).max() > 0.5:
-        values["revolutions"] = turned.copy()
-        values["revolutions"][known] = np.unwrap(turned[known], period=1)
-        return ["revolutions: of an angle that starts again after each one"]
-    if "load_point" in values or monotone_pieces(turned) is None:
+    source = next((one for one in ("revolutions", "rotation_speed") if one in kept), None)
+    if source is None:
         return []
-    del values["revolutions"]
+    turned = kept[source]
+    known = np.isfinite(turned)
+    if not known.any():
+        return []
+    if source == "rotation_speed":
+        speed = np.interp(time, time[known], turned[known])
+        steps = 0.5 * (speed[1:] + speed[:-1]) * np.diff(time)
+        turned = np.concatenate([[0.0], np.cumsum(steps)])
+    elif np.ptp(turned[known]) <= 1 and np.abs(np.diff(turned[known])).max() > 0.5:
+        kept[source] = turned.copy()
+        kept[source][known] = np.unwrap(turned[known], period=1)
+        return ["revolutions: of an angle that starts again after each one"]
+    if "load_point" in kept or monotone_pieces(turned) is None:
+        return []
+    del kept[source]
     if radius is None:
         return ["guess: the rotation goes back and forth; strokes by it need a --radius"]
-    values["load_point"] = math.tau * radius * turned
+    kept["load_point"] = math.tau * radius * turned
     return [
-        f"load point: 2 pi x radius ({_mean(radius, 'm')}) x revolutions, as they go back and "
-        f"forth, {_range(values['load_point'], 'load_point')}"
+        f"load point: 2 pi x radius ({_mean(radius, 'm')}) x {_in_words(source)}, as that "
+        f"goes back and forth, {_range(kept['load_point'], 'load_point')}"
     ]
 
 

@@ -27,6 +27,9 @@ from mesoslip.array_types import Array
 SMOOTH_AMPLITUDE = 0.02
 # Percentiles of the force; the amplitude is half their distance.
 LOW, HIGH = 5.0, 95.0
+# Minimum drop of rare slips in a motion that is not smooth, over twice the amplitude of smooth
+# sliding.
+DEEP = 2.0
 # Minimum share of the time at rest, and of the loading in slips, of a motion that is not smooth
 # even if its amplitude is that of the noise of a few contacts.
 RESTING = 0.8
@@ -137,6 +140,10 @@ def classify(
     never_slips = scales.is_rigid or (scales.is_measured and not len(slips))
     if never_slips and regime in {STICK_SLIP, IRREGULAR}:
         regime = SMOOTH
+    deep = int(np.count_nonzero(slips.drop > DEEP * 2 * smooth))
+    if regime == SMOOTH and deep and not (never_slips or scales.is_measured):
+        # Percentiles do not see rare slips.
+        regime = IRREGULAR if deep > 1 else TRANSIENT
     return replace(result, regime=regime)
 
 

@@ -5,7 +5,7 @@ which the drive moves; the first half counts as transient. ``docs/regimes.md`` e
 and reports their validation.
 """
 
-from mesoslip.analysis.regime.outputs import judge, regime, regimes, regimes_of_results
+from mesoslip.analysis.regime.outputs import judge, regime, regime_of_realization, regimes
 from mesoslip.analysis.regime.result import (
     IRREGULAR,
     NAMES,
@@ -32,8 +32,8 @@ __all__ = [
     "classify",
     "judge",
     "regime",
+    "regime_of_realization",
     "regimes",
-    "regimes_of_results",
     "results_of",
     "summary",
 ]

@@ -226,8 +226,10 @@ def test_an_interrupt_after_the_output_is_written_is_answered_at_once(
     classify = outputs.classify
 
     def classify_once(*arguments):
-        judged.append(arguments)
-        os.kill(os.getpid(), signal.SIGINT)
+        # The first one may be evaluated before others run.
+        if output.exists():
+            judged.append(arguments)
+            os.kill(os.getpid(), signal.SIGINT)
         return classify(*arguments)
 
     monkeypatch.setattr(outputs, "classify", classify_once)
@@ -301,6 +303,25 @@ def test_start_up_is_quick():
         "slow = {'matplotlib', 'scipy', 'xarray', 'netCDF4', 'pint', 'rich'} & sys.modules.keys()\n"
         "assert not slow, slow"
     )
+
+
+def test_regimes_are_evaluated_while_others_run(short, tmp_path, command, monkeypatch):
+    """And once more after the output is written where that fails."""
+    evaluate, calls = outputs.regime_of_realization, []
+
+    def counted(config, one):
+        calls.append((one.number, (tmp_path / "short.nc").exists()))
+        if calls[-1] == (0, False):
+            raise RunError("no regime")
+        return evaluate(config, one)
+
+    monkeypatch.setattr("mesoslip.analysis.regime.outputs.regime_of_realization", counted)
+    options = ("--set", "run.realizations=3", "--workers", "1")
+    err = command("run", short, *options, "-o", tmp_path / "short.nc")[2]
+    assert "3 realizations" in err
+    # Others may have run many at a time, and are evaluated afterwards.
+    assert [one for one in calls if one[0] == 0] == [(0, False), (0, True)]
+    assert {number for number, _ in calls} == {0, 1, 2}
 
 
 def test_a_run_needs_no_thread_for_imports(short, tmp_path, command, monkeypatch):

@@ -31,8 +31,10 @@ from mesoslip.errors import FileError, MesoslipError, NoMemoryError
 from mesoslip.execution.stop import Stop, stopped_by_signals
 
 if TYPE_CHECKING:
+    from mesoslip.analysis.regime.result import RegimeResult
     from mesoslip.configuration.config import Config
     from mesoslip.simulation.checkpoint import Checkpoint
+    from mesoslip.simulation.realization import Realization
     from mesoslip.simulation.run_realizations import Results
 
 # Exit status after Ctrl-C.
@@ -44,7 +46,7 @@ LONG = 60.0
 # Rows of the trace that are read at once.
 MAX_ROWS = 400_000
 # Modules that are needed after a run only, and take long to import.
-LATER = ("mesoslip.output.writing", "mesoslip.output.files", "mesoslip.analysis.regime")
+LATER = ("mesoslip.output.writing", "mesoslip.output.files", "mesoslip.analysis.regime.outputs")
 
 
 def run(
@@ -113,6 +115,7 @@ def run(
         Checkpoint(folder, checked, interval=interval, resume=resume, report=report) as checkpoint,
         stopped_by_signals() as stop,
     ):
+        regimes = _Regimes(checked)
         try:
             with _imported_meanwhile(), progress_shown(quiet) as progress:
                 results = run_realizations(
@@ -121,6 +124,7 @@ def run(
                     progress=progress,
                     stop=stop,
                     checkpoint=checkpoint,
+                    evaluate=None if quiet or not regimes.are_wanted else regimes.take,
                 )
         except NoMemoryError as error:
             if not checkpoint.is_written:
@@ -146,7 +150,7 @@ def run(
                 ) from error
             raise
         if not quiet:
-            _report_results(results, checked, path, stop)
+            _report_results(results, regimes, path, stop)
         files.remove_partial(_partial(path))
         checkpoint.remove()
 
@@ -209,10 +213,11 @@ def _keep(results: Results, path: Path, stop: Stop, checkpoint: Checkpoint) -> i
     return stop.exit_status
 
 
-def _report_results(results: Results, config: Config, path: Path, stop: Stop) -> None:
+def _report_results(results: Results, regimes: _Regimes, path: Path, stop: Stop) -> None:
     from mesoslip.output import layout
     from mesoslip.simulation.realization import ENDINGS
 
+    config = results.config
     known = layout.attributes(results)
     counts = [counted(known["break_count"], "break")]
     if config.has_avalanches:
@@ -227,7 +232,7 @@ def _report_results(results: Results, config: Config, path: Path, stop: Stop) ->
     if config.drive.is_force:
         say(f"{path}: {_mean_velocity(results, config)}")
     else:
-        say(f"{path}: {_regimes(results, config, path, stop)}")
+        say(f"{path}: {regimes.summary(results, path, stop)}")
     if known["break_count"] == 0:
         say(f"{path}: no contact broke: {_short_drive(config)}")
     if known["audit"] != "passed":
@@ -261,23 +266,43 @@ def _short_drive(config: Config) -> str:
     return f"the path of the drive is {path_length}, and F_s/K is {needed}"
 
 
-def _regimes(results: Results, config: Config, path: Path, stop: Stop) -> str:
-    """The regimes of all realizations, which may take longer than short runs; after an interrupt,
-    or of strokes, the command that evaluates them."""
-    from mesoslip.analysis.regime import outputs, result
+class _Regimes:
+    """The regimes of the realizations of a run, each evaluated on the thread that has run it."""
 
-    if config.drive.cycle is not None:
-        return f"the drive goes back and forth; 'mesoslip strokes {path}' evaluates its strokes"
-    found: list[result.RegimeResult] = []
-    count = len(results.realizations)
-    with progress_shown(count == 1, "regimes") as progress:
-        for one in outputs.regimes_of_results(results):
-            if stop.is_set():
-                return f"complete; 'mesoslip regime {path}' prints the regime"
-            found.append(one)
-            if len(found) % max(1, count // 100) == 0:
-                progress(len(found) / count)
-    return result.summary(found)
+    def __init__(self, config: Config) -> None:
+        self._config = config
+        self._found: dict[int, RegimeResult] = {}
+
+    @property
+    def are_wanted(self) -> bool:
+        """Whether a regime is that of the motion: not of strokes, nor under a force."""
+        return not self._config.drive.is_force and self._config.drive.cycle is None
+
+    def take(self, one: Realization) -> None:
+        """Evaluate a realization at its end."""
+        from mesoslip.analysis.regime import outputs
+
+        # What fails is evaluated once more, and fails, after the output is written.
+        with suppress(Exception):
+            self._found[one.number] = outputs.regime_of_realization(self._config, one)
+
+    def summary(self, results: Results, path: Path, stop: Stop) -> str:
+        """The regimes of all realizations, which may take longer than short runs; after an
+        interrupt, or of strokes, the command that evaluates them."""
+        from mesoslip.analysis.regime import outputs, result
+
+        if self._config.drive.cycle is not None:
+            return f"the drive goes back and forth; 'mesoslip strokes {path}' evaluates its strokes"
+        count = len(results.realizations)
+        with progress_shown(count == 1, "regimes") as progress:
+            for number, one in enumerate(results.realizations, 1):
+                if stop.is_set():
+                    return f"complete; 'mesoslip regime {path}' prints the regime"
+                if one.number not in self._found:
+                    self._found[one.number] = outputs.regime_of_realization(self._config, one)
+                if number % max(1, count // 100) == 0:
+                    progress(number / count)
+        return result.summary([self._found[one.number] for one in results.realizations])
 
 
 def _mean_velocity(results: Results, config: Config) -> str:

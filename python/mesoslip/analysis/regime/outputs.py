@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -23,7 +23,8 @@ from mesoslip.simulation.recorded_tables import SLIP_COLUMNS, TRACE_COLUMNS
 
 if TYPE_CHECKING:
     from mesoslip.analysis.strokes.segments import Piece
-    from mesoslip.simulation.run_realizations import Results
+    from mesoslip.configuration.config import Config
+    from mesoslip.simulation.realization import Realization
 
 
 # Maximum number of evaluated samples; longer traces are thinned out.
@@ -209,32 +210,30 @@ def regime(output: OutputLike) -> Dataset:
         return regimes(tree, name)
 
 
-def regimes_of_results(results: Results) -> Iterator[RegimeResult]:
-    """The regimes of the realizations of a run; only the evaluated samples are held in memory."""
+def regime_of_realization(config: Config, one: Realization) -> RegimeResult:
+    """The regime of a realization of a run; only the evaluated samples are held in memory."""
     index = {name: number for number, name in enumerate(TRACE_COLUMNS)}
     wanted = [index[name] for name in ("time", "elastic_force", "velocity")]
     slip_index = {name: number for number, name in enumerate(SLIP_COLUMNS)}
-    for one in results.realizations:
-        rows = one.rows("trace")
-        if len(rows) < 2 * MIN_CYCLES:
-            yield RegimeResult()
-            continue
-        scales = Scales.of_config(results.config, one.time)
-        stage = scales.stage
-        step = _step(len(rows))
-        blocks, start = [np.empty((0, len(wanted)))], 0
-        for block in rows.blocks(MAX_SAMPLES):
-            chosen = block[-start % step :: step][:, wanted]
-            inside = (chosen[:, 0] >= stage.middle) & (chosen[:, 0] <= stage.end)
-            blocks.append(chosen[inside])
-            start += len(block)
-        time, force, velocity = np.concatenate(blocks).T
-        slips = np.concatenate(
-            [np.empty((0, len(SLIP_COLUMNS))), *one.rows("slips").blocks(MAX_SAMPLES)]
-        )
-        columns = ("start_time", "end_time", "force_before", "force_after")
-        began, ended, before, after = (slips[:, slip_index[name]] for name in columns)
-        yield classify(scales, time, force, velocity, Slips(began, ended, before, before - after))
+    rows = one.rows("trace")
+    if len(rows) < 2 * MIN_CYCLES:
+        return RegimeResult()
+    scales = Scales.of_config(config, one.time)
+    stage = scales.stage
+    step = _step(len(rows))
+    blocks, start = [np.empty((0, len(wanted)))], 0
+    for block in rows.blocks(MAX_SAMPLES):
+        chosen = block[-start % step :: step][:, wanted]
+        inside = (chosen[:, 0] >= stage.middle) & (chosen[:, 0] <= stage.end)
+        blocks.append(chosen[inside])
+        start += len(block)
+    time, force, velocity = np.concatenate(blocks).T
+    slips = np.concatenate(
+        [np.empty((0, len(SLIP_COLUMNS))), *one.rows("slips").blocks(MAX_SAMPLES)]
+    )
+    columns = ("start_time", "end_time", "force_before", "force_after")
+    began, ended, before, after = (slips[:, slip_index[name]] for name in columns)
+    return classify(scales, time, force, velocity, Slips(began, ended, before, before - after))
 
 
 def _step(count: int) -> int:

@@ -6,7 +6,7 @@ import pytest
 from mesoslip import SteadySliding
 from mesoslip.simulation.realization import Realization
 from oracles import uniforms
-from test_steady_sliding import study
+from steady_sliding import shaken_response, tables
 
 EXPONENTIAL = {"contacts__delay_law": "exponential"}
 # Delays of the order of lives, at a velocity at which a contact lives 0.8 ms.
@@ -96,15 +96,14 @@ def test_response_is_that_of_a_memoryless_delay(klein):
         complex(fixed.response_at(0.01)), rel=1e-3
     )
     assert random.slope == fixed.slope
-    module = study()
     contacts = {"threshold": {"law": "gaussian", "relative_width": 0.3}, "delay_law": "exponential"}
     config = mesoslip.Config.from_dict(
         {
-            **module.tables(contacts=contacts),
+            **tables(contacts=contacts),
             "run": {"engine": "me", "duration": 1.0},
             "drive": {"velocity": 1e-6},
         }
     )
     expected = complex(SteadySliding(config).response(600.0))
-    found = module.shaken_response(1e-6, 600.0, 1e-10, 0.1, periods=8, contacts=contacts)
+    found = shaken_response(1e-6, 600.0, 1e-10, 0.1, periods=8, contacts=contacts)
     assert found == pytest.approx(expected, rel=0.02)

@@ -16,7 +16,7 @@ from mesoslip.theory.contacts.ageing_sliding import AgeingSliding
 from mesoslip.theory.contacts.thermal_sliding import RateAndStateTheory
 from mesoslip.theory.critical_spring import critical_spring
 from mesoslip.theory.steady_sliding import sliding_of, stability_boundary, steady_sliding
-from test_steady_sliding import study
+from steady_sliding import shaken_response, tables
 
 pytestmark = pytest.mark.usefixtures("no_step_errors")
 
@@ -79,17 +79,16 @@ def test_unstable_modes_of_layers_with_temperature(klein, layers, damping):
 )
 def test_the_engine_answers_as_the_theory(contacts, velocity):
     """The master equation under a slider that is shaken a little."""
-    module = study()
     contacts = contacts | {"coupling": "equal"}
     config = Config.from_dict(
         {
-            **module.tables(contacts=contacts),
+            **tables(contacts=contacts),
             "run": {"engine": "me", "duration": 1.0},
             "drive": {"velocity": velocity},
         }
     )
     expected = complex(sliding_of(config).response(600.0))
-    found = module.shaken_response(velocity, 600.0, 1e-9, 0.05, periods=4, contacts=contacts)
+    found = shaken_response(velocity, 600.0, 1e-9, 0.05, periods=4, contacts=contacts)
     assert abs(found - expected) < 0.01 * abs(expected)
 
 

@@ -460,6 +460,12 @@ def test_falls_of_the_track_of_a_disc_are_no_slips(tmp_path) -> None:  # type: i
         assert (text in tree.attrs.get("comment", "")) == is_track
         assert (tree["slips"].sizes["slip"] == 0) == is_track
     assert mesoslip.read_trace(file, min_fall=0.3)["slips"].sizes["slip"] > 0
+    # An angle that hardly turns, as of a plane that is tilted, keeps any phase.
+    saw = 2 + 0.5 * np.interp((time / 1.3) % 1, [0, 0.8, 1], [0, 1, 0])
+    table = np.transpose([time, saw + 0.01 * rng.standard_normal(time.size), 0.2 * time])
+    header = "time [s],force [N],angle [deg]"
+    np.savetxt(file, table, delimiter=",", header=header, comments="", fmt="%.4f")
+    assert mesoslip.read_trace(file)["slips"].sizes["slip"] > 100
 
 
 def test_a_file_of_a_disc(tmp_path) -> None:  # type: ignore[no-untyped-def]

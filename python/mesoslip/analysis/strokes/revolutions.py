@@ -32,9 +32,9 @@ MAX_GAP = 0.2
 MAX_CHANGE = 0.02
 COUNT, SPEED = "revolutions", "rotation_speed"
 # Falls of the track: minimum number, maximum number that is compared, minimum duration over the
-# time between them, and minimum coherence with the rotation, whose speed may be wrong by a share,
-# or with a multiple of it.
-MIN_FALLS, MAX_FALLS, MIN_SLOW, MIN_COHERENCE = 20, 1000, 0.1, 0.7
+# time between them, minimum number of revolutions, and minimum coherence with the rotation, whose
+# speed may be wrong by a share, or with a multiple of it.
+MIN_FALLS, MAX_FALLS, MIN_SLOW, MIN_REVOLUTIONS, MIN_COHERENCE = 20, 1000, 0.1, 3.0, 0.7
 SPEED_ERROR, MAX_MULTIPLE = 0.02, 4
 
 
@@ -180,6 +180,8 @@ def are_of_track(slips: FoundSlips, time: Array, angle: Array) -> bool:
     if float(np.median(took)) < MIN_SLOW * float(np.median(waited)):
         return False
     at = np.interp(slips.start_time, time, angle)[:MAX_FALLS]
+    if at[-1] - at[0] < MIN_REVOLUTIONS:
+        return False
     for multiple in range(1, MAX_MULTIPLE + 1):
         span = multiple * float(at[-1] - at[0])
         count = 2 * math.ceil(4 * SPEED_ERROR * span) + 1

@@ -96,9 +96,12 @@ def energy_bound(kind):
 @pytest.mark.usefixtures("no_step_errors")
 @pytest.mark.parametrize("kind", pairwise(kind for kind in KINDS if "force" not in kind))
 def test_energy_of_ramps_is_balanced(kind):
-    steps = {"run__resolution": 1.0} if ", me" in kind else {}
+    has_steps = ", me" in kind
+    steps = {"run__resolution": 1.0} if has_steps else {}
     tree = mesoslip.run(configuration(kind, **RAMPS | steps))
-    assert np.all(np.abs(tree["energy_residual"].values) < energy_bound(kind))
+    # Steps of a radian: the work on contacts that attach is by a polynomial of fourth order.
+    bound = (3 if has_steps else 1) * energy_bound(kind)
+    assert np.all(np.abs(tree["energy_residual"].values) < bound)
     assert tree.attrs["audit"] == "passed"
 
 

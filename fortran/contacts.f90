@@ -6,8 +6,8 @@ module mesoslip_contacts
    use mesoslip_contacts_lattice, only: make_contact_lattice
    use mesoslip_contacts_populations, only: make_contact_populations
    use mesoslip_contacts_row, only: block_key, contact_row_type
+   use mesoslip_contacts_thermal_activated, only: make_activated_contacts
    use mesoslip_contacts_thermal_ageing, only: make_thermal_ageing_contacts
-   use mesoslip_contacts_thermal_contacts, only: make_thermal_contacts
    use mesoslip_numerics_errors, only: error_type, raise, status_invalid, status_memory
    use mesoslip_numerics_kinds, only: i8, wp
    use mesoslip_numerics_parameters, only: parameters_type
@@ -107,7 +107,7 @@ contains
       case ("populations")
          call make_contact_populations(contacts, common, parameters, .false., .false., error)
       case ("thermal")
-         call make_thermal_contacts(contacts, common, parameters, error)
+         call make_activated_contacts(contacts, common, parameters, error)
       case ("thermal ageing")
          call make_thermal_ageing_contacts(contacts, common, parameters, error)
       case ("thermal ageing populations")

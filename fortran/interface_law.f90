@@ -37,6 +37,8 @@ module mesoslip_interface_law
       !> Maximum duration of an advance by a series, over the time in which the slider oscillates by
       !> a radian or is damped
       real(wp) :: max_phase = 0.5_wp
+      !> Whether most steps end in time, so that a short one may turn round
+      logical :: may_turn = .false.
    end type window_type
 
    !> Time and motion of a slider.

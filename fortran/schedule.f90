@@ -6,17 +6,15 @@
 !>
 !> It ends before any event that it does not foresee: results do not depend on its length.
 !>
-!> With clocks of thermally activated breaking a contact may be in two lists, by coordinate and by
-!> the reading of a clock; after it broke as an entry of one list, that of the other is gone.
-!>
 !> Of thresholds that grow the coordinates are bounds. Before each step those of contacts that may
 !> break in it are evaluated, and their breaks extrapolated from the motion of the slider.
+!>
+!> With thermal activation candidates for breaking have times that are known before.
 module mesoslip_schedule
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_numerics_accumulator, only: accumulator_type
    use mesoslip_ageing_law, only: ageing_law_type
-   use mesoslip_hazard, only: hazard_type
-   use mesoslip_interface_law, only: clocks, interface_law_type, pose_type, window_type
+   use mesoslip_interface_law, only: interface_law_type, pose_type, window_type
    use mesoslip_motion_prediction, only: prediction_type
    use mesoslip_track_strength, only: track_strength_type
    implicit none
@@ -55,10 +53,11 @@ module mesoslip_schedule
       !> max_force [N]
       real(wp) :: mean_stiffness = 0.0_wp, max_force = 0.0_wp
 
-      !> For each break: coordinate along the direction [m], stiffness [N/m], origin [m], and drag
-      !> of the detached contact [N s/m]
-      real(wp) :: break_coordinate(max_events) = 0.0_wp, break_stiffness(max_events) = 0.0_wp, &
-         & break_origin(max_events) = 0.0_wp, break_drag(max_events) = 0.0_wp
+      !> For each break: coordinate along the direction [m], with candidates followed by that of the
+      !> first one beyond the list; stiffness [N/m], origin [m], and drag of the detached contact
+      !> [N s/m]
+      real(wp) :: break_coordinate(max_events + 1) = 0.0_wp, break_stiffness(max_events) = 0.0_wp, &
+         & break_origin(2 * max_events) = 0.0_wp, break_drag(max_events) = 0.0_wp
       !> Times [s] and displacements [m] of past breaks, in their order
       real(wp) :: break_time(2 * max_events) = 0.0_wp, &
          & break_displacement(2 * max_events) = 0.0_wp
@@ -84,41 +83,31 @@ module mesoslip_schedule
       !> Whether it multiplies first stretches too
       logical :: scales_stretches = .false.
       !> Whether contacts that break may attach within the schedule; for each break the delay until
-      !> then [s], the stiffness [N/m], the first stretch and that at breaking [m], and the deviate
-      !> of the next life. Breaks by a clock are listed after the others.
+      !> then [s], the stiffness [N/m], the first stretch and that at breaking [m]. Those of
+      !> candidates are listed after the others.
       logical :: has_births = .false.
       real(wp) :: birth_delay(2 * max_events) = 0.0_wp, birth_stiffness(2 * max_events) = 0.0_wp, &
-         & birth_stretch(2 * max_events) = 0.0_wp, birth_limit(2 * max_events) = 0.0_wp, &
-         & birth_left(2 * max_events) = 0.0_wp
+         & birth_stretch(2 * max_events) = 0.0_wp, birth_limit(2 * max_events) = 0.0_wp
 
-      !> Whether there are clocks; the clocks, and the number of that of the list
-      logical :: has_clocks = .false.
-      type(hazard_type) :: hazard
-      integer :: number = 1
-      !> Listed breaks by the clock, and those that are past or gone
-      integer :: clock_breaks = 0, clock_broken = 0
-      !> For each its reading [s], and origin [m]
-      real(wp) :: clock_key(max_events) = 0.0_wp, clock_origin(max_events) = 0.0_wp
-      !> Entry of the clock's list that ends the schedule without a break, or 0
-      integer :: clock_stop = 0
-      !> For each entry that of the same contact in the other list, or 0, and whether it is gone
-      integer :: break_twin(max_events) = 0, clock_twin(max_events) = 0
-      logical :: break_gone(max_events) = .false., clock_gone(max_events) = .false.
-      !> For each entry by coordinate whether the contact does not break there, but moves to the
-      !> clock of the motion; its stretch at breaking [m], its remaining deviate, and its reading
-      !> [s], by the other clock before that and by this one after it
-      logical :: break_turns(max_events) = .false.
-      real(wp) :: turn_limit(max_events) = 0.0_wp, turn_left(max_events) = 0.0_wp, &
-         & turn_key(max_events) = 0.0_wp
-      !> Past moves to that clock; contacts of the other clock, and the entry of the first of them
-      !> to break, 0 if it is not listed
-      integer :: turned = 0, others = 0, other_first = 0
-      !> All past breaks, and the entry of each, negative in the list of the clock
+      !> All past breaks, and the entry of each
       integer :: came_count = 0, came(2 * max_events) = 0
       !> Whether contacts broke in the last step
       logical :: breaks_now = .false.
-      !> For each attachment the deviate, and the reading at which the contact breaks [s]
-      real(wp) :: attach_left(max_events) = 0.0_wp, attach_key(max_events) = 0.0_wp
+      !> Whether contacts break by thermal activation; listed candidates of their breaks, and those
+      !> that are past
+      logical :: has_candidates = .false.
+      integer :: candidates = 0, tried = 0
+      !> For each its time [s], followed by that of the first one beyond the list; displacements
+      !> from which on, and down to which, it is accepted [m]; and the entry of its contact among
+      !> the breaks, which go on with those of candidates, 0 if the contacts decide
+      real(wp) :: candidate_time(max_events + 1) = huge(1.0_wp), &
+         & candidate_upper(max_events) = 0.0_wp, candidate_lower(max_events) = 0.0_wp
+      integer :: candidate_entry(max_events) = 0
+      !> For each break, and for the first one beyond the list, whether the contact has broken
+      logical :: is_gone(2 * max_events) = .false.
+      !> Displacements at which it ends, and between which the contacts that attach end it [m]
+      real(wp) :: upper = huge(1.0_wp), lower = -huge(1.0_wp), newborn_upper = huge(1.0_wp), &
+         & newborn_lower = -huge(1.0_wp)
 
       !> Whether thresholds grow; how, and the motion of the slider as predicted
       logical :: has_growth = .false.
@@ -136,6 +125,20 @@ module mesoslip_schedule
       logical :: entry_is_constant(max_events) = .false.
       real(wp) :: entry_limit(max_events) = 0.0_wp, entry_configured(max_events) = 0.0_wp, &
          & entry_mean(max_events) = 0.0_wp, entry_birth(max_events) = 0.0_wp
+
+      !> Whether contacts with changing thresholds break by candidates, too. For each candidate the
+      !> direction of its force, and the displacement from which on in that direction it is accepted
+      !> if the threshold is its bound [m]; of those that are past whether the contact broke, or was
+      !> refused for the growth of its threshold alone. The entry is 0 if the contact is gone
+      logical :: has_entries = .false.
+      real(wp) :: candidate_side(max_events) = 0.0_wp, candidate_start(max_events) = 0.0_wp
+      logical :: candidate_breaks(max_events) = .false., candidate_refused(max_events) = .false.
+      !> For each entry its origin, and the bound on its threshold as a stretch [m]
+      real(wp) :: entry_origin(max_events) = 0.0_wp, entry_bound(max_events) = 0.0_wp
+      !> Whether a contact has attached that ends it. For each attachment and birth a bound on the
+      !> threshold, as a stretch [m]
+      logical :: has_newborn = .false.
+      real(wp) :: attach_bound(max_events) = 0.0_wp, birth_bound(max_events) = 0.0_wp
    contains
       !> Contact force until the next event, and the window until then
       procedure, non_overridable :: law, window
@@ -147,12 +150,14 @@ module mesoslip_schedule
       procedure, non_overridable :: pass
       procedure, non_overridable, private :: break_due, attach_due, fit_to_track, &
          & insert_attachment, cut_breaks
+      !> Break the contacts of candidates. By dispatch, as below.
+      procedure, private :: try_candidates
       !> Let sites touch or separate. By dispatch, because a copy of it in pass would keep that from
       !> being inlined into the loops of sliders.
       procedure, private :: follow_load
-      procedure, non_overridable, private :: pass_clocks, break_by_clock, &
-         & pass_coordinate, break_with_clocks, attach_with_clocks, &
-         & change_clock, cut_lists, skip_gone, find_met, sort_breaks
+      !> The same as pass with candidates
+      procedure, private :: pass_candidates
+      procedure, non_overridable, private :: find_met, sort_breaks, break_candidate
    end type schedule_type
 
 contains
@@ -190,7 +195,12 @@ contains
          window%upper = -self%behind
          window%lower = -ahead
       end if
-      if (self%has_clocks) call self%hazard%limit_window(window)
+      if (self%has_candidates) then
+         window%end_time = min(window%end_time, self%candidate_time(self%tried + 1))
+         window%may_turn = .true.
+         window%upper = min(window%upper, self%upper)
+         window%lower = max(window%lower, self%lower)
+      end if
    end function window
 
    !> Number of contacts that broke.
@@ -198,7 +208,8 @@ contains
       class(schedule_type), intent(in) :: self
       integer :: number
 
-      number = merge(self%came_count, self%broken, self%has_clocks)
+      number = merge(self%came_count, self%broken, &
+         & self%has_candidates .and. .not. self%has_entries)
    end function break_count
 
    !> Make the events that are due: first contacts break, then contacts attach, then sites touch or
@@ -208,11 +219,12 @@ contains
       !> Time [s] and displacement of the slider [m]
       real(wp), intent(in) :: time, displacement
 
-      if (self%has_clocks) then
-         call self%pass_clocks(time, displacement)
+      if (self%has_candidates .and. .not. self%has_entries) then
+         call self%pass_candidates(time, displacement)
          return
       end if
       if (self%has_growth) call self%find_met(time, displacement)
+      if (self%has_entries) call self%try_candidates(time, displacement)
       if (self%break_coordinate(self%broken + 1) <= self%direction * displacement) then
          if (self%is_bounded) then
             self%at_bound = .true.
@@ -229,7 +241,69 @@ contains
       self%is_over = self%broken == self%breaks .or. time >= self%end_time &
          & .or. self%attach_time(self%attached + 1) <= time &
          & .or. abs(displacement) * self%mean_stiffness >= self%max_force
+      if (self%has_entries) self%is_over = self%is_over .or. self%has_newborn &
+         & .or. self%tried == self%candidates .and. self%candidates > 0 &
+         & .or. self%candidate_time(self%tried + 1) <= time &
+         & .or. displacement >= self%upper .or. displacement <= self%lower
    end subroutine pass
+
+   !> Try the candidates that are due. Those that break become the first breaks of the list.
+   subroutine try_candidates(self, time, displacement)
+      class(schedule_type), intent(inout) :: self
+      real(wp), intent(in) :: time, displacement
+
+      real(wp) :: excess, growth
+      integer :: candidate
+
+      self%breaks_now = .false.
+      do candidate = self%tried + 1, self%candidates
+         if (self%candidate_time(candidate) > time) exit
+         self%candidate_breaks(candidate) = .false.
+         self%candidate_refused(candidate) = .false.
+         associate (entry => self%candidate_entry(candidate), &
+            & side => self%candidate_side(candidate))
+            if (entry == 0) cycle
+            excess = side * (displacement - self%candidate_start(candidate))
+            if (self%is_gone(entry) .or. excess < 0.0_wp &
+               & .or. side * (displacement - self%entry_origin(entry)) < 0.0_wp) cycle
+            growth = self%ageing%threshold(self%entry_configured(entry), self%entry_mean(entry), &
+               & time - self%entry_birth(entry)) - self%entry_bound(entry)
+            self%candidate_refused(candidate) = excess < growth
+            if (self%candidate_refused(candidate)) cycle
+            self%candidate_breaks(candidate) = .true.
+            self%is_gone(entry) = .true.
+            call move_first(self, entry, self%direction * displacement)
+         end associate
+      end do
+      self%tried = candidate - 1
+   end subroutine try_candidates
+
+   !> Make an entry the first one that breaks next.
+   subroutine move_first(self, entry, coordinate)
+      type(schedule_type), intent(inout) :: self
+      integer, intent(in) :: entry
+      !> Coordinate at which it breaks [m]
+      real(wp), intent(in) :: coordinate
+
+      integer :: place, event
+
+      do place = self%broken + 1, self%breaks
+         if (self%break_entry(place) == entry) exit
+      end do
+      if (place > self%breaks) then
+         self%breaks = place
+         self%break_stiffness(place) = self%mean_stiffness
+         self%break_drag(place) = self%break_drag(1)
+      end if
+      do event = place, self%broken + 2, -1
+         self%break_coordinate(event) = self%break_coordinate(event - 1)
+         self%break_origin(event) = self%break_origin(event - 1)
+         self%break_entry(event) = self%break_entry(event - 1)
+      end do
+      self%break_coordinate(self%broken + 1) = coordinate
+      self%break_origin(self%broken + 1) = self%entry_origin(entry)
+      self%break_entry(self%broken + 1) = entry
+   end subroutine move_first
 
    !> Break all contacts that are due.
    subroutine break_due(self, time, displacement)
@@ -249,13 +323,17 @@ contains
       if (self%has_births) then
          do broken = self%broken + 1, event - 1
             entry = broken
-            if (self%has_growth) entry = self%break_entry(broken)
+            if (self%has_growth .or. self%has_entries) entry = self%break_entry(broken)
             call self%insert_attachment(entry, time, self%break_drag(broken))
          end do
       else if (self%broken == 0) then
          ! With one delay for all, those that break now attach after all listed ones.
          self%attach_time(self%attachments + 1) = min(self%attach_time(self%attachments + 1), &
             & time + self%delay)
+      end if
+      if (self%has_entries) then
+         self%is_gone(self%break_entry(self%broken + 1:event - 1)) = .true.
+         self%breaks_now = .true.
       end if
       self%moments = self%moments + 1
       self%pinned = self%pinned - (event - 1 - self%broken)
@@ -286,15 +364,6 @@ contains
          self%attachments = max(self%attached, max_events - 1)
       end if
       if (due >= self%attach_time(self%attachments + 1)) return
-      if (self%has_clocks .and. self%direction * self%birth_stretch(event) < 0.0_wp) then
-         ! The contact is one of the other clock, which ends the schedule.
-         do while (self%attachments > self%attached)
-            if (self%attach_time(self%attachments) <= due) exit
-            self%attachments = self%attachments - 1
-         end do
-         self%attach_time(self%attachments + 1) = due
-         return
-      end if
       place = self%attachments + 1
       self%attach_time(place + 1) = self%attach_time(place)
       do while (place > self%attached + 1)
@@ -304,7 +373,7 @@ contains
          self%attach_stretch(place) = self%attach_stretch(place - 1)
          self%attach_limit(place) = self%attach_limit(place - 1)
          self%attach_drag(place) = self%attach_drag(place - 1)
-         if (self%has_clocks) self%attach_left(place) = self%attach_left(place - 1)
+         if (self%has_entries) self%attach_bound(place) = self%attach_bound(place - 1)
          place = place - 1
       end do
       self%attach_time(place) = due
@@ -312,7 +381,7 @@ contains
       self%attach_stretch(place) = self%birth_stretch(event)
       self%attach_limit(place) = self%birth_limit(event)
       self%attach_drag(place) = drag
-      if (self%has_clocks) self%attach_left(place) = self%birth_left(event)
+      if (self%has_entries) self%attach_bound(place) = self%birth_bound(event)
       self%attachments = self%attachments + 1
    end subroutine insert_attachment
 
@@ -351,6 +420,9 @@ contains
          call self%stiffness%add(self%attach_stiffness(event))
          call self%offset%add(self%attach_stiffness(event) * origin)
          call self%cut_breaks(origin, self%attach_limit(event))
+         if (self%has_entries) self%has_newborn = self%has_newborn &
+            & .or. origin + self%attach_bound(event) < self%newborn_upper &
+            & .or. origin - self%attach_bound(event) > self%newborn_lower
       end do
       self%attached = event - 1
    end subroutine attach_due
@@ -397,6 +469,10 @@ contains
 
       self%behind = max(self%behind, self%direction * origin - limit)
       ahead = self%direction * origin + limit
+      if (self%has_candidates .and. .not. self%has_entries) then
+         self%is_over = self%is_over .or. origin + limit < self%newborn_upper &
+            & .or. origin - limit > self%newborn_lower
+      end if
       if (self%has_growth) then
          self%unlisted = min(self%unlisted, ahead)
          return
@@ -405,6 +481,9 @@ contains
          if (self%break_coordinate(self%breaks) < ahead) exit
          self%breaks = self%breaks - 1
       end do
+      if (self%has_candidates .and. .not. self%has_entries) then
+         self%break_coordinate(self%breaks + 1) = min(self%break_coordinate(self%breaks + 1), ahead)
+      end if
    end subroutine cut_breaks
 
    !> Find where the next step ends, if thresholds grow: at the first break by extrapolation of
@@ -419,7 +498,8 @@ contains
 
       if (.not. self%has_growth) return
       call self%prediction%predict(pose, self%law())
-      self%window_time = min(self%attach_time(self%attached + 1), self%site_time(self%moved + 1))
+      self%window_time = min(self%attach_time(self%attached + 1), &
+         & self%site_time(self%moved + 1), self%candidate_time(self%tried + 1))
       call self%prediction%limit_time(pose, self%window_time)
       reach = self%prediction%reach(pose, self%direction, self%window_time)
       self%meeting = huge(1.0_wp)
@@ -502,114 +582,73 @@ contains
       end do
    end subroutine sort_breaks
 
-   !> The same as pass with clocks: contacts break by their clock, then by coordinate, then others
-   !> attach. At the end of the schedule further events that are due are left to the contacts.
-   subroutine pass_clocks(self, time, displacement)
+   !> Contacts break by coordinate, then by candidates, then others attach. At the end of the
+   !> schedule further events that are due are left to the contacts.
+   subroutine pass_candidates(self, time, displacement)
       class(schedule_type), intent(inout) :: self
       real(wp), intent(in) :: time, displacement
 
-      logical :: far(clocks)
-      integer :: earlier, other
+      integer :: earlier
 
       earlier = self%came_count
-      other = clocks + 1 - self%number
-      if (self%clock_key(self%clock_broken + 1) <= self%hazard%reading(self%number)) then
-         call self%break_by_clock(time, displacement)
-      end if
-      if (self%broken < self%breaks) then
-         if (self%break_coordinate(self%broken + 1) <= self%direction * displacement) then
-            call self%pass_coordinate(time, displacement)
-         end if
-      end if
-      self%breaks_now = self%came_count > earlier
-      if (self%breaks_now) self%moments = self%moments + 1
-
-      call self%hazard%is_far(self%number, displacement, far(self%number))
-      far(other) = .false.
-      if (self%hazard%is_used(other)) then
-         call self%hazard%is_far(other, displacement, far(other))
-         far(other) = far(other) .or. self%hazard%reading(other) >= self%hazard%next(other)
-      end if
-      self%is_over = self%is_over .or. any(far) .or. time >= self%end_time &
-         & .or. abs(displacement) * self%mean_stiffness >= self%max_force &
-         & .or. self%broken == self%breaks .or. self%clock_broken == self%clock_breaks &
-         & .or. self%pinned == self%others
-      if (self%is_over) return
-      if (self%attach_time(self%attached + 1) <= time) then
-         if (allocated(self%strength)) call self%fit_to_track(time, displacement)
-         call self%attach_with_clocks(time, displacement)
-         self%is_over = self%broken == self%breaks .or. self%clock_broken == self%clock_breaks &
-            & .or. self%attach_time(self%attached + 1) <= time
-         if (self%is_over) return
-      end if
-      self%hazard%next(self%number) = self%clock_key(self%clock_broken + 1)
-   end subroutine pass_clocks
-
-   !> Break the contacts whose keys the clock has reached.
-   subroutine break_by_clock(self, time, displacement)
-      class(schedule_type), intent(inout) :: self
-      real(wp), intent(in) :: time, displacement
-
-      do while (self%clock_broken < self%clock_breaks)
-         associate (event => self%clock_broken + 1)
-            if (event == self%clock_stop &
-               & .or. self%clock_key(event) > self%hazard%reading(self%number)) exit
-            call self%break_with_clocks(time, displacement, -event, self%clock_origin(event))
-            if (self%clock_twin(event) > 0) self%break_gone(self%clock_twin(event)) = .true.
-         end associate
-         self%clock_broken = self%clock_broken + 1
-      end do
-      call self%skip_gone()
-   end subroutine break_by_clock
-
-   !> Break the contacts that have reached their thresholds, and move those to the other clock that
-   !> have reached where they turn.
-   subroutine pass_coordinate(self, time, displacement)
-      class(schedule_type), intent(inout) :: self
-      real(wp), intent(in) :: time, displacement
-
-      integer :: other
-
-      other = clocks + 1 - self%number
       do while (self%broken < self%breaks)
          associate (event => self%broken + 1)
-            if (self%break_coordinate(event) > self%direction * displacement) exit
-            if (self%break_turns(event)) then
-               ! Contacts of the other clock break first.
-               if (self%hazard%reading(other) >= self%hazard%next(other)) then
-                  self%is_over = .true.
-                  exit
-               end if
-               call self%change_clock(event)
-            else
-               call self%break_with_clocks(time, displacement, event, self%break_origin(event))
-               if (self%break_twin(event) > 0) self%clock_gone(self%break_twin(event)) = .true.
+            if (.not. self%is_gone(event)) then
+               if (self%break_coordinate(event) > self%direction * displacement) exit
+               call self%break_candidate(event, time, displacement)
             end if
          end associate
          self%broken = self%broken + 1
-         call self%skip_gone()
       end do
-   end subroutine pass_coordinate
+      do while (self%candidate_time(self%tried + 1) <= time .and. self%tried < self%candidates)
+         associate (event => self%tried + 1, entry => self%candidate_entry(self%tried + 1))
+            if (entry == 0) then
+               self%is_over = .true.
+               exit
+            end if
+            if (.not. self%is_gone(entry) .and. (displacement >= self%candidate_upper(event) &
+               & .or. displacement <= self%candidate_lower(event))) then
+               call self%break_candidate(entry, time, displacement)
+            end if
+         end associate
+         self%tried = self%tried + 1
+      end do
+      do while (self%broken < self%breaks)
+         if (.not. self%is_gone(self%broken + 1)) exit
+         self%broken = self%broken + 1
+      end do
+      self%breaks_now = self%came_count > earlier
+      if (self%breaks_now) self%moments = self%moments + 1
 
-   !> Break a contact.
-   subroutine break_with_clocks(self, time, displacement, entry, origin)
+      ! Without the first contact beyond the list it is not known where the next one breaks.
+      self%is_over = self%is_over .or. self%is_gone(self%breaks + 1) .or. time >= self%end_time &
+         & .or. abs(displacement) * self%mean_stiffness >= self%max_force &
+         & .or. (self%tried == self%candidates .and. self%candidates > 0) &
+         & .or. displacement >= self%upper .or. displacement <= self%lower &
+         & .or. self%break_coordinate(self%broken + 1) <= self%direction * displacement
+      if (self%is_over .or. self%attach_time(self%attached + 1) > time) return
+      if (allocated(self%strength)) call self%fit_to_track(time, displacement)
+      call self%attach_due(time, displacement)
+      self%is_over = self%is_over .or. self%attach_time(self%attached + 1) <= time &
+         & .or. self%break_coordinate(self%broken + 1) <= self%direction * displacement
+   end subroutine pass_candidates
+
+   !> Break the contact of an entry.
+   subroutine break_candidate(self, entry, time, displacement)
       class(schedule_type), intent(inout) :: self
-      real(wp), intent(in) :: time, displacement
-      !> Entry of its list, negative in that of the clock
       integer, intent(in) :: entry
-      !> Its origin [m]
-      real(wp), intent(in) :: origin
+      real(wp), intent(in) :: time, displacement
 
+      self%is_gone(entry) = .true.
       self%came_count = self%came_count + 1
       self%came(self%came_count) = entry
       self%break_time(self%came_count) = time
       self%break_displacement(self%came_count) = displacement
       call self%stiffness%add(-self%break_stiffness(1))
-      call self%offset%add(-self%break_stiffness(1) * origin)
+      call self%offset%add(-self%break_stiffness(1) * self%break_origin(entry))
       if (self%break_drag(1) > 0.0_wp) call self%drag%add(self%break_drag(1))
       if (self%has_births) then
-         call self%insert_attachment(merge(entry, max_events - entry, entry > 0), time, &
-            & self%break_drag(1))
+         call self%insert_attachment(entry, time, self%break_drag(1))
       else if (self%came_count == 1) then
          ! With one delay for all, those that break now attach after all listed ones.
          self%attach_time(self%attachments + 1) = min(self%attach_time(self%attachments + 1), &
@@ -621,86 +660,6 @@ contains
          self%stiffness = accumulator_type()
          self%offset = accumulator_type()
       end if
-   end subroutine break_with_clocks
-
-   !> Skip contacts that have broken as entries of the other list.
-   pure subroutine skip_gone(self)
-      class(schedule_type), intent(inout) :: self
-
-      do while (self%broken < self%breaks)
-         if (.not. self%break_gone(self%broken + 1)) exit
-         self%broken = self%broken + 1
-      end do
-      do while (self%clock_broken < self%clock_breaks)
-         if (.not. self%clock_gone(self%clock_broken + 1)) exit
-         self%clock_broken = self%clock_broken + 1
-      end do
-   end subroutine skip_gone
-
-   !> The same as attach_due with clocks.
-   subroutine attach_with_clocks(self, time, displacement)
-      class(schedule_type), intent(inout) :: self
-      real(wp), intent(in) :: time, displacement
-
-      real(wp) :: origin
-      integer :: event
-
-      do event = self%attached + 1, self%attachments
-         if (self%attach_time(event) > time) exit
-         self%attach_displacement(event) = displacement
-         origin = displacement - self%attach_stretch(event)
-         call self%drag%add(-self%attach_drag(event))
-         self%pinned = self%pinned + 1
-         self%detached = self%detached - 1
-         if (self%detached == 0) self%drag = accumulator_type()
-         call self%stiffness%add(self%attach_stiffness(event))
-         call self%offset%add(self%attach_stiffness(event) * origin)
-         self%attach_key(event) = self%hazard%key(self%number, self%attach_left(event), &
-            & self%attach_limit(event), origin)
-         call self%cut_lists(origin, self%attach_limit(event), self%attach_key(event))
-      end do
-      self%attached = event - 1
-   end subroutine attach_with_clocks
-
-   !> Move a contact to the clock of the motion.
-   subroutine change_clock(self, event)
-      class(schedule_type), intent(inout) :: self
-      !> Entry of the list by coordinate
-      integer, intent(in) :: event
-
-      associate (origin => self%break_origin(event), limit => self%turn_limit(event), &
-         & left => self%turn_left(event), key => self%turn_key(event))
-         left = self%hazard%left(clocks + 1 - self%number, key, left, limit, origin)
-         key = self%hazard%key(self%number, left, limit, origin)
-         self%turned = self%turned + 1
-         self%others = self%others - 1
-         ! Then the next contact of the other clock is not known.
-         if (event == self%other_first .or. self%others == 0) self%is_over = .true.
-         ! Its own entry must stay.
-         self%broken = event
-         call self%cut_lists(origin, limit, key)
-         self%broken = event - 1
-      end associate
-   end subroutine change_clock
-
-   !> End the lists before a contact that is not in them.
-   subroutine cut_lists(self, origin, limit, key)
-      class(schedule_type), intent(inout) :: self
-      !> Origin of the contact, its stretch at breaking [m], and the reading at which it breaks [s]
-      real(wp), intent(in) :: origin, limit, key
-
-      real(wp) :: ahead
-
-      self%behind = max(self%behind, self%direction * origin - self%hazard%turn_stretch(limit))
-      ahead = self%direction * origin + limit
-      do while (self%breaks > self%broken)
-         if (self%break_coordinate(self%breaks) < ahead) exit
-         self%breaks = self%breaks - 1
-      end do
-      do while (self%clock_breaks > self%clock_broken)
-         if (self%clock_key(self%clock_breaks) < key) exit
-         self%clock_breaks = self%clock_breaks - 1
-      end do
-   end subroutine cut_lists
+   end subroutine break_candidate
 
 end module mesoslip_schedule

@@ -84,13 +84,8 @@ contains
       type(schedule_type), intent(inout) :: schedule
       type(step_filter_type), intent(inout) :: filter
 
-      self%has_clocks = schedule%has_clocks
       do
-         if (schedule%has_clocks) then
-            call schedule%hazard%offer(self%displacement, self%clock)
-         end if
          call move_uniformly(self, schedule%law(), schedule%window(self%time))
-         if (schedule%has_clocks) call schedule%hazard%advance(self%clock)
          call filter%examine(self%time, self%velocity, self%start_acceleration, self%acceleration)
          if (filter%is_selected .or. self%direction * schedule%direction < 0.0_wp) return
          call schedule%pass(self%time, self%displacement)

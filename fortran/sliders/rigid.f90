@@ -17,7 +17,7 @@ module mesoslip_sliders_rigid
    use mesoslip_sliders_motion_series, only: horner, integral
    use mesoslip_sliders_rigid_long_step, only: take_long_step
    use mesoslip_sliders_rigid_settled_step, only: try_settled_step
-   use mesoslip_sliders_rigid_short_step, only: audit, books_of, derive, end_by_clocks, find_end, &
+   use mesoslip_sliders_rigid_short_step, only: audit, books_of, derive, find_end, &
       & keep_series, look_ahead, move, short_step_type, step_books_type, try_short_step
    use mesoslip_sliders_rigid_state, only: constants, drive_gap_at, few_terms, long_terms, &
       & many_terms, motion_rates, motion_rates_type, rates, rigid_motion_type, rigid_state_type, &
@@ -90,13 +90,10 @@ contains
       type(step_filter_type), intent(inout) :: filter
 
       ! The compiler makes a copy for each constant.
-      if (schedule%has_clocks) then
-         self%has_clocks = .true.
-         call run_through(self, schedule, filter, .true., .false.)
-      else if (schedule%has_growth) then
-         call run_through(self, schedule, filter, .false., .true.)
+      if (schedule%has_growth) then
+         call run_through(self, schedule, filter, .true.)
       else
-         call run_through(self, schedule, filter, .false., .false.)
+         call run_through(self, schedule, filter, .false.)
       end if
    end subroutine run_ahead
 
@@ -104,12 +101,12 @@ contains
    !> known only after a chain of operations, each of which waits for the one before, and the
    !> processor cannot predict whether a contact breaks or attaches then. Meanwhile work and losses
    !> of the step before are added up.
-   subroutine run_through(self, schedule, filter, has_clocks, has_growth)
+   subroutine run_through(self, schedule, filter, has_growth)
       type(slider_rigid_type), intent(inout) :: self
       type(schedule_type), intent(inout) :: schedule
       type(step_filter_type), intent(inout) :: filter
-      !> Whether the schedule has clocks, or thresholds that grow
-      logical, intent(in) :: has_clocks, has_growth
+      !> Whether the schedule has thresholds that grow
+      logical, intent(in) :: has_growth
 
       type(system_type) :: system
       type(pose_type) :: pose
@@ -138,16 +135,11 @@ contains
          step%drive_gap = drive_gap_at(self, motion)
          step%early = motion_rates(system, self%damping, motion, step%drive_gap, &
             & law%stiffness * motion%displacement - law%offset)
-         if (has_clocks) then
-            call schedule%hazard%offer(motion%displacement, self%clock)
-            call limit_window(self%clock, motion%time, motion%velocity, window)
-         end if
          call look_ahead(motion, window, step)
          call derive(system, self%damping, step)
          if (is_pending) call audit(self, books, motion)
          call find_end(system, self%damping, step, is_short)
          if (is_short) then
-            if (has_clocks) call end_by_clocks(self%clock, motion%time, step)
             call move(self, system, law, step, motion)
             books = books_of(step, law%drag)
          else
@@ -156,8 +148,8 @@ contains
             self%step_time = step_time
             self%start_displacement = start_displacement
             system%drive_gap = step%drive_gap
-            if (has_clocks) then
-               call take_clocked_step(self, system, window, step%early)
+            if (schedule%has_candidates) then
+               call take_timed_step(self, system, window, step%early)
             else
                call take_long_step(self, system, window, step%early)
             end if
@@ -165,7 +157,6 @@ contains
             step%acceleration = self%acceleration
          end if
          is_pending = is_short
-         if (has_clocks) call schedule%hazard%advance(self%clock)
 
          call filter%examine(motion%time, motion%velocity, step%early%acceleration, &
             & step%acceleration)
@@ -231,15 +222,15 @@ contains
          if (.not. is_done) call try_short_step(self, system, window, early, is_done)
       end if
       if (is_done) return
-      if (self%has_clocks) then
-         call take_clocked_step(self, system, window, early)
+      if (self%has_clocks .or. window%may_turn) then
+         call take_timed_step(self, system, window, early)
       else
          call take_long_step(self, system, window, early)
       end if
    end subroutine take_step
 
-   !> A step with clocks that is not a short one.
-   subroutine take_clocked_step(self, system, window, early)
+   !> A step that is not a short one, where most end in time or by a clock.
+   subroutine take_timed_step(self, system, window, early)
       type(slider_rigid_type), intent(inout) :: self
       type(system_type), intent(in) :: system
       type(window_type), intent(in) :: window
@@ -253,7 +244,7 @@ contains
          call try_settled_step(self, system, window, early, is_done)
       end if
       if (.not. is_done) call take_long_step(self, system, window, early)
-   end subroutine take_clocked_step
+   end subroutine take_timed_step
 
    pure subroutine complete_pose(self, pose)
       class(slider_rigid_type), intent(in) :: self

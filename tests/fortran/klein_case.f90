@@ -83,7 +83,8 @@ contains
             & [values, bell])
       case ("thermal ageing", "thermal ageing cold")
          call new_parameters(parameters, [character(len=name_length) :: common, ageing, &
-            & activation], [values, relax, bell])
+            & activation, "slider_jumps"], [values, relax, bell, &
+            & merge(1.0_wp, 0.0_wp, slider == "quasistatic")])
       case ("loaded", "loaded scattered")
          ! The normal load swings some 15 times in a run.
          call new_parameters(parameters, [character(len=name_length) :: common, "columns", &

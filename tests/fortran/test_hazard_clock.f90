@@ -1,6 +1,5 @@
 !> Clocks of thermal activation: readings and their times against a fine rule of Simpson.
 program test_hazard_clock
-   use mesoslip_hazard, only: hazard_type
    use mesoslip_interface_law, only: clocks, hazard_clock_type
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_sliders_hazard_clock, only: advance_clocks, reading_after, time_to_reading
@@ -41,40 +40,9 @@ program test_hazard_clock
       & 2.0e-12_wp, "step by its ends")
    call check_largest([-0.12_wp, 4.0e-3_wp, -1.0e-4_wp, 1.0e-6_wp, -1.0e-8_wp, 1.0e-9_wp], &
       & 2.0e-12_wp, "step by its ends, the other direction")
-   call contacts_turn_before_their_rates_count()
    call finish()
 
 contains
-
-   !> A contact moves to the other clock while its rate is negligible, and before it breaks.
-   subroutine contacts_turn_before_their_rates_count()
-      type(hazard_type) :: hazard
-      real(wp), parameter :: ratio(4) = [2.0e-3_wp, 5.0e-3_wp, 2.0e-2_wp, 5.0e-2_wp], &
-         & limit(3) = [0.6_wp, 1.0_wp, 1.2_wp]
-      real(wp) :: stretch
-      integer :: scale, contact
-
-      do scale = 1, size(ratio)
-         hazard = hazard_type(rate=1.0e4_wp, slope=1.0_wp / ratio(scale))
-         call hazard%limit_turns(1.0_wp)
-         call hazard%delay_turns()
-         do contact = 1, size(limit)
-            stretch = hazard%turn_stretch(limit(contact))
-            call check(stretch > 0.0_wp .and. stretch < 0.95_wp * limit(contact), &
-               & "a contact turns before it breaks")
-            call check(stretch < 1.0e-11_wp .or. hazard%rate * exp(hazard%slope * (stretch &
-               & - limit(contact))) < 1.01e-13_wp, "a contact turns while its rate is negligible")
-         end do
-      end do
-      call check(hazard%turn_stretch(1.0_wp) < 1.0e-11_wp, &
-         & "at high temperature forces turn at once")
-      hazard = hazard_type(rate=1.0e4_wp, slope=50.0_wp)
-      call hazard%delay_turns()
-      call check(hazard%turn_stretch(1.0_wp) > 0.2_wp, "at low temperature they turn late")
-      hazard%rate = 1.0e-20_wp
-      call hazard%delay_turns()
-      call check(hazard%turn_stretch(1.0_wp) < 0.4_wp, "slow contacts turn far from breaking")
-   end subroutine contacts_turn_before_their_rates_count
 
    !> A step with the largest exponents of a rule, with and without an end, against ten points.
    subroutine check_largest(exponent, tolerance, name)

@@ -33,6 +33,21 @@ def test_steady_force_of_ageing_contacts_is_that_of_a_plain_quadrature(ageing):
     )
 
 
+@pytest.mark.parametrize(("ageing", "ratio"), [(LOG, 0.04), (RELAX, 0.1)], ids=["log", "relax"])
+def test_ageing_contacts_in_uniform_motion_bear_the_steady_force(ageing, ratio):
+    """One by one, from the state of contacts that do not age, which is forgotten."""
+    config = unit(
+        2000,
+        contacts__ageing=ageing,
+        contacts__thermal__force_ratio=ratio,
+        contacts__initial="steady",
+    )
+    force = mesoslip.run(config)["contact_force"].values[0, 200:]
+    steady = contact_theory(config).steady_force(config.drive_speed)
+    # The scatter of the mean is 5e-4.
+    assert np.mean(force) == pytest.approx(steady, rel=2e-3)
+
+
 @pytest.mark.parametrize("law", ["uniform", *map(long, ["gaussian", "weibull"])])
 def test_creep_is_the_inverse_of_the_steady_force(law):
     config = unit(1, contacts__threshold={"law": law, "relative_width": 0.2})

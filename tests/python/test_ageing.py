@@ -605,11 +605,14 @@ def test_few_contacts_are_visited_before_any_breaks(klein):
         assert realization.finished
 
 
-@pytest.mark.parametrize("changes", [{}, {"contacts__thermal": {"rate": 1e4, "force_ratio": 0.02}}])
-def test_a_rigid_slider_hardly_stops_where_nothing_happens(klein, changes):
+@pytest.mark.parametrize(
+    ("changes", "most"), [({}, 2.2), ({"contacts__thermal": {"rate": 1e4, "force_ratio": 0.02}}, 3)]
+)
+def test_a_rigid_slider_hardly_stops_where_nothing_happens(klein, changes, most):
     """Where it meets the threshold of one of few contacts follows from its equation of motion, so
     there are two advances for a break and the birth after it. By its acceleration, and bounds on
-    what changes that, there are 2.6 and 2.7."""
+    what changes that, there are 2.6. Activated contacts have some 0.8 ends of windows of their
+    candidates more."""
     config = klein(
         run__duration=0.2,
         drive={"velocity": 4.3e-3},
@@ -628,7 +631,7 @@ def test_a_rigid_slider_hardly_stops_where_nothing_happens(klein, changes):
     with Realization(config, 0) as realization:
         at_end(realization)
         assert realization.breaks > 5000
-        assert realization.advances < 2.2 * realization.breaks
+        assert realization.advances < most * realization.breaks
 
 
 @pytest.mark.parametrize("count", [1, 5])

@@ -12,7 +12,7 @@ from mesoslip import Config, ConfigError
 from mesoslip.simulation.realization import Realization
 from mesoslip.theory.contacts import contact_theory
 from oracles import aged, assert_same_events, fixed_step, frozen_law, uniforms
-from scipy import integrate, special
+from scipy import integrate, special, stats
 from test_events import breaks
 
 
@@ -105,42 +105,68 @@ def test_slope_is_half_the_force_scale_where_no_contact_comes_to_its_threshold()
     assert contact_theory(config).steady_slope(1e-8) == pytest.approx(0.005, rel=0.02)
 
 
-def breaking_stretch(config: Config, contact: int, renewal: int, velocity: float) -> float:
-    """Stretch at which a contact breaks in sliding from zero, by its two deviates."""
-    law = frozen_law("gaussian", config.contacts.threshold.relative_width)
-    threshold = law.isf(uniforms(1, 0, contact, renewal)[0] * law.sf(0))
-    deviate = -math.log(uniforms(1, 0, contact, renewal, 1)[0])
-    ratio = config.contacts.thermal.force_ratio
-    log_reach = math.log(ratio / velocity) - threshold / ratio
-    return min(threshold, ratio * float(np.logaddexp(0.0, math.log(deviate) - log_reach)))
+def hazard_of(
+    ratio: float, threshold: float, stretch: float, velocity: float, duration: float
+) -> float:
+    """Hazard of a contact in a uniform motion that begins at a stretch."""
+    if velocity == 0:
+        return math.exp((abs(stretch) - threshold) / ratio) * duration
+    first, last = (
+        math.copysign(math.exp((abs(one) - threshold) / ratio) - math.exp(-threshold / ratio), one)
+        for one in (stretch, stretch + velocity * duration)
+    )
+    return ratio * (last - first) / velocity
 
 
 @pytest.mark.parametrize(
-    ("ratio", "direction"),
-    [(1e-3, 1), (0.04, -1), (1.0, 1), long(1e-3, -1), long(0.04, 1), long(1.0, -1)],
+    ("ratio", "velocities"),
+    [
+        (0.01, [0.03]),
+        (0.04, [-0.3]),
+        (1.0, [0.3]),
+        (0.04, [0.3, 0.0, -0.1]),
+        (0.1, [3.0, -0.1, 0.0]),
+        (1.0, [0.3, -0.3]),
+    ],
 )
-def test_breaks_come_where_their_deviates_say(ratio, direction):
-    """Exact to rounding, for many lives, far from the start and in both directions."""
-    velocity = 0.3
+def test_hazards_between_breaks_are_exponential(ratio, velocities):
+    """In motions with both signs of the force. The hazard of a contact that breaks at its threshold
+    continues with that of its next life, or of the next contact."""
+    count, duration, stages = 40, 6.0, 60
     config = unit(
-        3,
-        run__duration=400.0,
-        run__seed=1,
-        drive__velocity=direction * velocity,
+        count,
+        run__duration=None,
+        drive={
+            "stage": [
+                {"duration": duration, "velocity": velocities[stage % len(velocities)]}
+                for stage in range(stages)
+            ]
+        },
         contacts__thermal={"rate": 1.0, "force_ratio": ratio},
-        output__interval=10.0,
+        contacts__threshold__relative_width=0.2,
+        output__interval=duration,
     )
-    expected = []
-    for contact in range(3):
-        place, renewal = 0.0, 0
-        while place < 400 * velocity:
-            place += breaking_stretch(config, contact, renewal, velocity)
-            renewal += 1
-            expected.append((place / velocity, contact))
-    expected = sorted(one for one in expected if one[0] < 400)
-    actual = breaks(config)
-    assert len(expected) == len(actual) > 320
-    assert_same_events(actual, expected, rtol=1e-12)
+    law = frozen_law("gaussian", 0.2)
+    events = breaks(config)
+    hazards, hazard = [], 0.0
+    for contact in range(count):
+        ends = [time for time, one in events if one == contact] + [duration * stages]
+        now = 0.0
+        for renewal, end in enumerate(ends):
+            threshold = law.isf(uniforms(1, 0, contact, renewal)[0] * law.sf(0))
+            stretch = 0.0
+            while now < end - 1e-12:
+                stage = int((now + 1e-12) // duration)
+                velocity = velocities[stage % len(velocities)]
+                step = min(end, (stage + 1) * duration) - now
+                hazard += hazard_of(ratio, threshold, stretch, velocity, step)
+                stretch += velocity * step
+                now += step
+            if abs(stretch) < threshold * (1 - 1e-9) and end < duration * stages:
+                hazards.append(hazard)
+                hazard = 0.0
+    assert len(hazards) > 50
+    assert stats.kstest(hazards, "expon").pvalue > 1e-3
 
 
 @pytest.mark.parametrize("ratio", [2e-3, 0.05, 1.0])
@@ -450,28 +476,24 @@ def test_contacts_reach_their_thresholds_after_a_reversal(seed):
     ],
     ids=["slips", "reversal"],
 )
-def test_fixed_steps_converge_to_events(klein, changes):
+def test_breaks_have_the_distribution_of_a_fixed_step(klein, changes):
     """A rigid slider that slips, rings and turns round: forces of both signs."""
-    config = klein(
-        contacts__count=12,
-        contacts__coupling="equal",
-        contacts__threshold__relative_width=0.1,
-        contacts__thermal={"rate": 1e4, "force_ratio": 0.05},
-        output__interval=1e-4,
-        **changes,
-    )
-    expected = first_breaks(breaks(config))
-    errors = []
-    for step in (1.6e-5, 4e-6):
-        _, contacts = fixed_step(config, step)
-        errors.append(np.median(np.abs(first_breaks(contacts.events) - expected)))
-    assert errors[1] < 8e-6
-    assert errors[1] < 0.5 * errors[0]
-
-
-def first_breaks(events: list[tuple[float, int]]) -> np.ndarray:
-    """Times of the first breaks of each contact, (contacts, 4)."""
-    return np.array([[time for time, one in events if one == i][:4] for i in range(12)])
+    expected, actual = [], []
+    for seed in range(12):
+        config = klein(
+            run__seed=seed,
+            contacts__count=12,
+            contacts__coupling="equal",
+            contacts__threshold__relative_width=0.1,
+            contacts__thermal={"rate": 1e4, "force_ratio": 0.05},
+            output__interval=1e-4,
+            **changes,
+        )
+        _, contacts = fixed_step(config, 8e-6)
+        expected += [time for time, _ in contacts.events]
+        actual += [time for time, _ in breaks(config)]
+    assert abs(len(actual) / len(expected) - 1) < 0.05
+    assert stats.ks_2samp(expected, actual).pvalue > 1e-3
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ module mesoslip_contacts_ageing_base
    implicit none
    private
 
-   public :: ageing_contacts_type, append, remove, position_of
+   public :: ageing_contacts_type, append, rebuild_ageing, remove, position_of
    public :: tiny_gap
    public :: in_queue, in_leaders, in_falling
    public :: leaders, falling, near
@@ -92,7 +92,10 @@ module mesoslip_contacts_ageing_base
       !> Contacts of the breaks in the schedule
       integer :: listed(max_events) = 0
    contains
-      procedure :: rebuild, behind_of, records, limit_at_birth
+      procedure :: rebuild => rebuild_ageing
+      procedure :: behind_of, records, limit_at_birth
+      !> For kinds that break by thermal activation, too: a life begins or ends, contacts break
+      procedure :: begin_life, end_life, break_activated
       procedure, non_overridable :: solve, solve_all, put, refresh, threshold, mean_of, ahead_of, &
          & behind_at
       procedure, non_overridable :: is_due, is_falling, record_lateness, count_visits
@@ -237,8 +240,10 @@ contains
       coordinate = ahead_coordinate(self%record(:, contact), self%direction)
    end function ahead_of
 
-   subroutine rebuild(self, displacement)
+   !> Sort all contacts again.
+   subroutine rebuild_ageing(self, displacement)
       class(ageing_contacts_type), intent(inout) :: self
+      !> Displacement of the slider [m]
       real(wp), intent(in) :: displacement
 
       integer :: contact, position
@@ -253,7 +258,28 @@ contains
       do position = 1, self%list(leaders)%count
          self%leader_key(position) = self%ahead_of(self%list(leaders)%contact(position))
       end do
-   end subroutine rebuild
+   end subroutine rebuild_ageing
+
+   !> A contact has attached: nothing more here.
+   subroutine begin_life(self, contact)
+      class(ageing_contacts_type), intent(inout) :: self
+      integer, intent(in) :: contact
+
+   end subroutine begin_life
+
+   !> A contact breaks or separates: nothing more here.
+   subroutine end_life(self, contact)
+      class(ageing_contacts_type), intent(inout) :: self
+      integer, intent(in) :: contact
+
+   end subroutine end_life
+
+   !> Break contacts by thermal activation: none here.
+   subroutine break_activated(self, pose)
+      class(ageing_contacts_type), intent(inout) :: self
+      type(pose_type), intent(in) :: pose
+
+   end subroutine break_activated
 
    !> Falling thresholds have their own bounds (mesoslip_contacts_ageing_falling).
    pure function behind_of(self, contact) result(coordinate)

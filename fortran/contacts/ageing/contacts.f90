@@ -23,8 +23,8 @@ module mesoslip_contacts_ageing_contacts
    use mesoslip_contacts_ageing_leaders, only: add_leader, bound_leaders, break_leaders, &
       & gather_leaders, remove_leader, sort_leaders
    use mesoslip_contacts_ageing_motion, only: follow_motion
-   use mesoslip_contacts_ageing_steady, only: break_steady, plan_steady, queue_newborn, &
-      & settle_steady
+   use mesoslip_contacts_ageing_steady, only: break_steady, list_steady, queue_newborn, &
+      & solve_attached, solve_listed
    use mesoslip_contacts_base, only: contact_parameters_type, contacts_type
    use mesoslip_contacts_individual_base, only: exchange_individual, total_law
    use mesoslip_contacts_individual_queue, only: new_contact_queue
@@ -40,6 +40,9 @@ module mesoslip_contacts_ageing_contacts
    private
 
    public :: contact_ageing_type, make_contact_ageing
+   ! For kinds that extend this one: a call by a component would lose their own procedures.
+   public :: set_up_ageing, initialize_ageing, offer_ageing, respond_ageing, plan_ageing, &
+      & settle_ageing, shift_ageing, exchange_ageing
 
    !> Probability of a threshold beyond the ring of buckets of the queue
    real(wp), parameter :: negligible = 1.0e-4_wp
@@ -55,9 +58,16 @@ module mesoslip_contacts_ageing_contacts
       !> Number of breaks in the next schedule of leaders, by how much happened in the last one
       integer, private :: wanted = max_listed
    contains
-      procedure :: initialize, offer, respond, plan, settle, join, leave, shift_order, exchange
-      procedure, private, non_overridable :: break_due, reverse, plan_growing, settle_growing, &
-         & list_newborn
+      procedure :: initialize => initialize_ageing
+      procedure :: offer => offer_ageing
+      procedure :: respond => respond_ageing
+      procedure :: plan => plan_ageing
+      procedure :: settle => settle_ageing
+      procedure :: shift_order => shift_ageing
+      procedure :: exchange => exchange_ageing
+      procedure :: join, leave, list_bounds, settle_activated
+      procedure, non_overridable :: list_limits
+      procedure, private, non_overridable :: break_due, reverse, list_leaders, settle_leaders
    end type contact_ageing_type
 
 contains
@@ -71,17 +81,32 @@ contains
       type(error_type), allocatable, intent(inout) :: error
 
       type(contact_ageing_type), allocatable :: self
+
+      allocate (self)
+      call set_up_ageing(self, common, 0, 0, parameters, error)
+      call parameters%finish(error)
+      call move_alloc(self, contacts)
+   end subroutine make_contact_ageing
+
+   !> Set up contacts of a kind.
+   subroutine set_up_ageing(self, common, columns, rows, parameters, error)
+      class(contact_ageing_type), intent(inout) :: self
+      type(contact_parameters_type), intent(in) :: common
+      !> Columns and rows of the lattice; 0 columns without a lattice
+      integer, intent(in) :: columns, rows
+      !> The other numbers: the law of ageing, and whether the slider jumps
+      type(parameters_type), intent(inout) :: parameters
+      type(error_type), allocatable, intent(inout) :: error
+
       real(wp) :: longest, rate
       integer :: stat
 
-      allocate (self)
       self%parameters = common
       call take_ageing_law(self%ageing, self%parameters%law, parameters, error)
       call parameters%take("slider_jumps", self%jumps, error)
-      call parameters%finish(error)
       if (allocated(error)) return
       self%stretch = common%static_force / common%stiffness
-      call self%allocate_records(0, 0, error)
+      call self%allocate_records(columns, rows, error)
       if (.not. allocated(error)) call self%births%record_factors(self%parameters, error)
       if (allocated(error)) return
       self%lists_sites = .not. (allocated(self%births%force) .or. common%strength%is_used)
@@ -105,10 +130,10 @@ contains
       call new_contact_queue(self%queue, common%count, &
          & 1.1_wp * self%stretch * longest * (1.0_wp + common%back_force_ratio) &
          & * common%strength%usual_max(), error)
-      call move_alloc(self, contacts)
-   end subroutine make_contact_ageing
+   end subroutine set_up_ageing
 
-   subroutine initialize(self, state)
+   !> Draw all contacts, and queue them.
+   subroutine initialize_ageing(self, state)
       class(contact_ageing_type), intent(inout) :: self
       integer, intent(in) :: state
 
@@ -125,9 +150,10 @@ contains
       ! The slider is in balance under this law.
       self%prediction%law = total_law(self)
       self%prediction%offered = self%prediction%law
-   end subroutine initialize
+   end subroutine initialize_ageing
 
-   subroutine offer(self, pose, law, window)
+   !> The law holds until a contact breaks or attaches.
+   subroutine offer_ageing(self, pose, law, window)
       class(contact_ageing_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
       type(interface_law_type), intent(out) :: law
@@ -150,10 +176,10 @@ contains
          call bound_falling(self, pose, upper, lower, end_time)
       end if
       window = self%window_between(lower, upper, end_time)
-   end subroutine offer
+   end subroutine offer_ageing
 
    !> Break all contacts that are due, then attach those that are, in the order in which they broke.
-   subroutine respond(self, before, after)
+   subroutine respond_ageing(self, before, after)
       class(contact_ageing_type), intent(inout) :: self
       type(pose_type), intent(in) :: before, after
 
@@ -172,13 +198,17 @@ contains
       call self%break_due(after)
       if (self%breaks > breaks) self%is_unchanged = .false.
       call self%attach_due(after)
-   end subroutine respond
+   end subroutine respond_ageing
 
-   subroutine plan(self, pose, limit, schedule)
+   !> Write a schedule of the next breaks and about as many attachments.
+   subroutine plan_ageing(self, pose, limit, schedule)
       class(contact_ageing_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
+      !> Maximum number of breaks, and of attachments
       integer, intent(in) :: limit
       type(schedule_type), intent(inout) :: schedule
+
+      integer :: number, contact(max_events)
 
       schedule%is_over = .true.
       if (self%jumps .or. pose%direction * self%direction < 0.0_wp) return
@@ -188,26 +218,47 @@ contains
       call follow_motion(self, pose)
       schedule%has_growth = .not. self%is_steady
       if (self%is_steady) then
-         call plan_steady(self, pose, limit, schedule)
-      else if (pose%is_known .and. self%list(falling)%count == 0) then
-         call self%plan_growing(pose, limit, schedule)
+         call list_steady(self, min(limit, max_events), schedule, number)
+      else
+         if (.not. (pose%is_known .and. self%list(falling)%count == 0)) return
+         call self%list_leaders(pose, min(limit, self%wanted), schedule, number)
       end if
-   end subroutine plan
+      if (number == 0) return
+      schedule%break_stiffness(:number) = self%parameters%stiffness
+      schedule%break_drag(:number) = drag_of(self%parameters, self%parameters%stiffness)
+      schedule%breaks = number
+      schedule%written = number
+      schedule%broken = 0
+      schedule%moments = 0
+      schedule%direction = self%direction
+      schedule%behind = self%behind
+      call self%list_attachments(min(limit, max_events, &
+         & merge(2, 1, self%is_steady) * number + 4), pose%direction, schedule, contact)
+      call self%list_limits(contact(:schedule%attachments), schedule%attach_limit, &
+         & schedule%attach_bound)
+      call self%list_births(self%listed(:number), 0, pose%direction, schedule)
+      if (schedule%has_births) call self%list_limits(self%listed(:number), &
+         & schedule%birth_limit, schedule%birth_bound)
+      call self%list_sites(min(limit, max_events), self%listed(:number), schedule)
+      schedule%is_over = .false.
+   end subroutine plan_ageing
 
-   !> Write a schedule of the leaders and about as many attachments.
-   subroutine plan_growing(self, pose, limit, schedule)
+   !> List the breaks of the leaders.
+   subroutine list_leaders(self, pose, limit, schedule, number)
       class(contact_ageing_type), intent(inout) :: self
       type(pose_type), intent(in) :: pose
+      !> Maximum number of breaks
       integer, intent(in) :: limit
       type(schedule_type), intent(inout) :: schedule
+      integer, intent(out) :: number
 
-      integer :: number, event, contact(max_events)
+      integer :: event
 
-      call gather_leaders(self, pose, min(limit, self%wanted))
+      call gather_leaders(self, pose, limit)
       self%cost = 1.0_wp
       schedule%unlisted = self%queue%first_key
       associate (list => self%list(leaders))
-         do event = 1, min(limit, self%wanted, list%count)
+         do event = 1, min(limit, list%count)
             associate (one => list%contact(list%count + 1 - event))
                if (self%is_falling(one) &
                   & .or. self%leader_key(list%count + 1 - event) >= schedule%unlisted) exit
@@ -227,102 +278,136 @@ contains
             schedule%unlisted = min(schedule%unlisted, self%leader_key(list%count - number))
          end if
       end associate
-      if (number == 0) return
-      schedule%break_stiffness(:number) = self%parameters%stiffness
-      schedule%break_drag(:number) = drag_of(self%parameters, self%parameters%stiffness)
-      schedule%breaks = number
-      schedule%written = number
-      schedule%broken = 0
-      schedule%moments = 0
       schedule%lateness = 0.0_wp
-      schedule%direction = self%direction
-      schedule%behind = self%behind
       schedule%ageing = self%ageing
       schedule%prediction = self%prediction
       schedule%resolution = tiny_gap * self%stretch
-      call self%list_attachments(min(limit, max_events, number + 4), pose%direction, schedule, &
-         & contact)
-      call self%list_newborn(contact(:schedule%attachments), schedule%attach_limit)
-      call self%list_births(self%listed(:number), 0, pose%direction, schedule)
-      if (schedule%has_births) then
-         call self%list_newborn(self%listed(:number), schedule%birth_limit)
-      end if
-      call self%list_sites(min(limit, max_events), self%listed(:number), schedule)
-      schedule%is_over = .false.
-   end subroutine plan_growing
+   end subroutine list_leaders
 
-   !> Replace the configured breaking stretches of contacts in their next life by bounds [m].
-   subroutine list_newborn(self, contact, limit)
+   !> Replace the configured breaking stretches of contacts by their limits in the next life [m]:
+   !> where they break in the steady motion, else bounds.
+   subroutine list_limits(self, contact, limit, bound)
       class(contact_ageing_type), intent(inout) :: self
       integer, intent(in) :: contact(:)
       real(wp), intent(inout) :: limit(:)
+      !> Bounds on their thresholds [m], for kinds that need them
+      real(wp), intent(inout) :: bound(:)
 
       integer :: event
 
       do event = 1, size(contact)
          self%next(next_configured, contact(event)) = limit(event)
-         limit(event) = self%limit_at_birth(limit(event))
       end do
-   end subroutine list_newborn
+      if (self%is_steady) then
+         call solve_listed(self, contact, limit)
+      else
+         do event = 1, size(contact)
+            limit(event) = self%limit_at_birth(limit(event))
+         end do
+      end if
+      call self%list_bounds(contact, bound)
+   end subroutine list_limits
 
-   subroutine settle(self, schedule, pose)
+   !> List bounds on the thresholds of contacts in their next life, the configured stretches of
+   !> which are set: not needed here.
+   subroutine list_bounds(self, contact, bound)
+      class(contact_ageing_type), intent(in) :: self
+      integer, intent(in) :: contact(:)
+      !> The bounds [m]
+      real(wp), intent(inout) :: bound(:)
+
+   end subroutine list_bounds
+
+   !> Update the contacts after a schedule.
+   subroutine settle_ageing(self, schedule, pose)
       class(contact_ageing_type), intent(inout) :: self
+      !> The schedule; moments in which contacts broke may be added
       type(schedule_type), intent(inout) :: schedule
       type(pose_type), intent(in) :: pose
 
+      real(wp) :: breaks
+      integer :: event, number, contact(max_events)
+
       self%now = pose%time
+      call self%settle_activated(schedule, number)
+      call self%detach_listed(self%listed(schedule%break_entry(:schedule%broken)), schedule)
       if (schedule%has_growth) then
-         call self%settle_growing(schedule)
+         call self%settle_leaders(schedule)
       else
          self%prediction%jerk_error = 0.0_wp
-         call settle_steady(self, schedule)
+         if (schedule%broken > number) then
+            call self%queue%remove_previewed(self%record, schedule%broken - number)
+         end if
       end if
-      call self%move_listed(schedule, pose)
-      ! A contact that has just broken and attaches at once was not in the schedule.
-      if (schedule%is_over) call self%attach_due(pose)
-      self%detached_count = real(self%detached%count, wp)
-   end subroutine settle
-
-   !> Update the contacts after a schedule of leaders.
-   subroutine settle_growing(self, schedule)
-      class(contact_ageing_type), intent(inout) :: self
-      type(schedule_type), intent(in) :: schedule
-
-      integer :: event, first, contact(max_events)
-
-      self%wanted = min(max_listed, min_listed + 2 * max(schedule%broken, schedule%attached))
-      self%prediction = schedule%prediction
-      self%error_estimate = max(self%error_estimate, merge(schedule%lateness, 0.0_wp, &
-         & schedule%lateness > schedule%resolution) * self%parameters%stiffness)
-      call self%detach_listed(self%listed(schedule%break_entry(:schedule%broken)), schedule)
-      self%kept(self%listed(schedule%break_entry(:schedule%broken))) = in_queue
-      associate (list => self%list(leaders))
-         ! Those that were listed are the last ones.
-         first = list%count - schedule%written
-         do event = schedule%broken + 1, schedule%written
-            associate (entry => schedule%break_entry(event), &
-               & position => first + 1 + schedule%written - event)
-               list%contact(position) = self%listed(entry)
-               self%leader_key(position) = schedule%break_coordinate(event)
-               self%record(row_limit, self%listed(entry)) = schedule%entry_limit(entry)
-            end associate
-         end do
-         list%count = list%count - schedule%broken
-      end associate
-      call sort_leaders(self, first + 1)
       call self%attach_listed(schedule, contact)
       do event = 1, schedule%attached
-         associate (one => contact(event), birth => schedule%attach_time(event))
-            self%life(:, one) = [birth, self%next(next_configured, one), no_motion]
+         associate (one => contact(event))
+            self%life(:, one) = [schedule%attach_time(event), self%next(next_configured, one), &
+               & merge(self%motion, no_motion, self%is_steady)]
             if (self%ageing%is_constant(self%life(life_limit, one), self%stretch)) then
                self%life(life_motion, one) = any_motion
             end if
             self%next(next_speed, one) = 0.0_wp
             call self%put(one)
+            if (self%is_steady) then
+               self%behind = max(self%behind, self%behind_at(one, schedule%attach_time(event)))
+            end if
+            call self%begin_life(one)
          end associate
       end do
+      if (self%is_steady) call solve_attached(self, contact(:schedule%attached))
+      call self%move_listed(schedule, pose)
+      if (schedule%is_over) then
+         breaks = self%breaks
+         call self%break_activated(pose)
+         if (self%breaks > breaks .and. .not. schedule%breaks_now) then
+            schedule%moments = schedule%moments + 1
+         end if
+         ! A contact that has just broken and attaches at once was not in the schedule.
+         call self%attach_due(pose)
+      end if
+      self%detached_count = real(self%detached%count, wp)
+   end subroutine settle_ageing
+
+   !> Update the leaders after a schedule of them.
+   subroutine settle_leaders(self, schedule)
+      class(contact_ageing_type), intent(inout) :: self
+      type(schedule_type), intent(in) :: schedule
+
+      integer :: event, first
+
+      self%wanted = min(max_listed, min_listed + 2 * max(schedule%broken, schedule%attached))
+      self%prediction = schedule%prediction
+      self%error_estimate = max(self%error_estimate, merge(schedule%lateness, 0.0_wp, &
+         & schedule%lateness > schedule%resolution) * self%parameters%stiffness)
+      self%kept(self%listed(schedule%break_entry(:schedule%broken))) = in_queue
+      associate (list => self%list(leaders))
+         ! Those that were listed are the last ones.
+         first = list%count - schedule%written
+         list%count = first + schedule%breaks - schedule%broken
+         do event = schedule%broken + 1, schedule%breaks
+            associate (entry => schedule%break_entry(event), &
+               & position => first + 1 + schedule%breaks - event)
+               list%contact(position) = self%listed(entry)
+               self%leader_key(position) = schedule%break_coordinate(event)
+               self%record(row_limit, self%listed(entry)) = schedule%entry_limit(entry)
+            end associate
+         end do
+      end associate
+      call sort_leaders(self, first + 1)
       self%behind = schedule%behind
-   end subroutine settle_growing
+   end subroutine settle_leaders
+
+   !> Take contacts that broke by thermal activation in a schedule out of the order of breaking, but
+   !> leaders that were listed: there are none here.
+   subroutine settle_activated(self, schedule, number)
+      class(contact_ageing_type), intent(inout) :: self
+      type(schedule_type), intent(in) :: schedule
+      !> Their number, with those leaders
+      integer, intent(out) :: number
+
+      number = 0
+   end subroutine settle_activated
 
    !> Break all contacts that are due.
    subroutine break_due(self, pose)
@@ -332,6 +417,8 @@ contains
       real(wp) :: breaks, margin
       integer :: contact
 
+      breaks = self%breaks
+      call self%break_activated(pose)
       if (self%direction * pose%displacement <= self%behind) then
          ! The bound may be that of a contact that has broken since.
          self%behind = self%max_behind()
@@ -339,7 +426,6 @@ contains
          if (self%ageing%acts()) margin = near_behind * self%stretch
          if (self%direction * pose%displacement <= self%behind + margin) call self%reverse(pose)
       end if
-      breaks = self%breaks
       if (self%is_steady) then
          call break_steady(self, pose)
       else
@@ -353,6 +439,7 @@ contains
             call self%refresh(contact, pose%time)
             if (self%is_due(contact, pose)) then
                call self%record_lateness(contact, pose)
+               call self%end_life(contact)
                call self%detach(contact, pose%displacement, pose%time)
             else
                call add_leader(self, contact)
@@ -384,6 +471,7 @@ contains
       end if
       call self%put(contact)
       self%behind = max(self%behind, self%behind_at(contact, pose%time))
+      call self%begin_life(contact)
    end subroutine join
 
    subroutine leave(self, contact)
@@ -403,6 +491,7 @@ contains
          call self%queue%remove(self%record, contact)
       end select
       self%kept(contact) = in_queue
+      call self%end_life(contact)
    end subroutine leave
 
    !> Reverse the direction of motion for which the queue is kept.
@@ -419,7 +508,7 @@ contains
    end subroutine reverse
 
    !> Shift the coordinates of the last scan, and the law that was offered.
-   subroutine shift_order(self, shift)
+   subroutine shift_ageing(self, shift)
       class(contact_ageing_type), intent(inout) :: self
       real(wp), intent(in) :: shift
 
@@ -428,9 +517,10 @@ contains
          self%scan_upper = self%scan_upper - self%direction * shift
          self%scan_lower = self%scan_lower - self%direction * shift
       end if
-   end subroutine shift_order
+   end subroutine shift_ageing
 
-   subroutine exchange(self, archive)
+   !> Write the state to an archive, or read it.
+   subroutine exchange_ageing(self, archive)
       class(contact_ageing_type), intent(inout) :: self
       type(archive_type), intent(inout) :: archive
 
@@ -453,6 +543,6 @@ contains
       call archive%exchange("is_steady", self%is_steady)
       call archive%exchange("motion", self%motion)
       call archive%exchange("speed", self%speed)
-   end subroutine exchange
+   end subroutine exchange_ageing
 
 end module mesoslip_contacts_ageing_contacts

@@ -202,6 +202,7 @@ contains
             & + tiny_gap * self%stretch
          if (self%record(row_limit, contact) > stretch) cycle
          if (self%threshold(contact, pose%time) > stretch) cycle
+         call self%end_life(contact)
          call self%detach(contact, pose%displacement, pose%time)
          call remove(self%list(near), position)
          call remove(self%list(falling), position_of(self%list(falling), contact))

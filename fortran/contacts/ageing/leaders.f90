@@ -239,6 +239,7 @@ contains
          call self%record_lateness(contact, pose)
          call remove_leader(self, position)
          self%kept(contact) = in_queue
+         call self%end_life(contact)
          call self%detach(contact, pose%displacement, pose%time)
       end do
    end subroutine break_leaders

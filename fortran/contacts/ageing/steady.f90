@@ -4,18 +4,16 @@
 !> fall. That is solved once, at birth, or before it for several contacts together.
 module mesoslip_contacts_ageing_steady
    use mesoslip_contacts_ageing_base, only: ageing_contacts_type, any_motion, falling, in_queue, &
-      & life_birth, life_limit, life_motion, next_configured, next_limit, next_speed, &
-      & solved_together
+      & life_limit, life_motion, next_limit, next_speed, solved_together
    use mesoslip_contacts_ageing_meeting, only: meet, meet_newborn
-   use mesoslip_contacts_individual_births, only: drag_of
    use mesoslip_contacts_individual_record, only: row_limit, row_next, row_origin, row_stiffness
    use mesoslip_interface_law, only: pose_type
    use mesoslip_numerics_kinds, only: wp
-   use mesoslip_schedule, only: max_events, schedule_type
+   use mesoslip_schedule, only: schedule_type
    implicit none
    private
 
-   public :: begin_steady, break_steady, queue_newborn, plan_steady, settle_steady
+   public :: begin_steady, break_steady, queue_newborn, list_steady, solve_listed, solve_attached
 
 contains
 
@@ -65,6 +63,7 @@ contains
             end if
             call self%record_lateness(contact, pose)
          end if
+         call self%end_life(contact)
          call self%detach(contact, pose%displacement, pose%time)
       end do
    end subroutine break_steady
@@ -150,39 +149,24 @@ contains
       end do
    end subroutine solve_next_lives
 
-   !> Write a schedule in a steady motion: the breaks at the front of the queue, up to a contact
-   !> that was queued for another motion, and about as many attachments.
-   subroutine plan_steady(self, pose, limit, schedule)
+   !> List the breaks at the front of the queue, up to a contact that was queued for another motion.
+   subroutine list_steady(self, limit, schedule, number)
       class(ageing_contacts_type), intent(inout) :: self
-      type(pose_type), intent(in) :: pose
+      !> Maximum number of breaks
       integer, intent(in) :: limit
       type(schedule_type), intent(inout) :: schedule
+      integer, intent(out) :: number
 
-      integer :: number, event, contact(max_events)
+      integer :: event
 
-      call self%queue%preview(self%record, min(limit, max_events), self%listed, &
-         & schedule%break_coordinate, number)
+      call self%queue%preview(self%record, limit, self%listed, schedule%break_coordinate, number)
       do event = 1, number
          if (self%life(life_motion, self%listed(event)) < self%motion) exit
+         schedule%break_entry(event) = event
          schedule%break_origin(event) = self%record(row_origin, self%listed(event))
       end do
       number = event - 1
-      if (number == 0) return
-      schedule%break_stiffness(:number) = self%parameters%stiffness
-      schedule%break_drag(:number) = drag_of(self%parameters, self%parameters%stiffness)
-      schedule%breaks = number
-      schedule%broken = 0
-      schedule%moments = 0
-      schedule%direction = self%direction
-      schedule%behind = self%behind
-      call self%list_attachments(min(limit, max_events, 2 * number + 4), pose%direction, &
-         & schedule, contact)
-      call solve_listed(self, contact(:schedule%attachments), schedule%attach_limit)
-      call self%list_births(self%listed(:number), 0, pose%direction, schedule)
-      if (schedule%has_births) call solve_listed(self, self%listed(:number), schedule%birth_limit)
-      call self%list_sites(min(limit, max_events), self%listed(:number), schedule)
-      schedule%is_over = .false.
-   end subroutine plan_steady
+   end subroutine list_steady
 
    !> Replace the configured breaking stretches of contacts by their limits in the next life [m].
    subroutine solve_listed(self, contact, limit)
@@ -194,7 +178,6 @@ contains
 
       do event = 1, size(contact)
          associate (next => self%next(:, contact(event)))
-            next(next_configured) = limit(event)
             if (self%ageing%is_constant(limit(event), self%stretch)) cycle
             if (abs(next(next_speed) - self%speed) > 0.0_wp) then
                next(next_limit) = newborn_limit(self, limit(event), self%stretch)
@@ -205,35 +188,19 @@ contains
       end do
    end subroutine solve_listed
 
-   !> Update the contacts after a schedule in a steady motion.
-   subroutine settle_steady(self, schedule)
+   !> Have the next limits of contacts that have attached in a schedule solved, after all are
+   !> queued, because that discards a solved next limit.
+   subroutine solve_attached(self, contact)
       class(ageing_contacts_type), intent(inout) :: self
-      type(schedule_type), intent(in) :: schedule
+      integer, intent(in) :: contact(:)
 
-      integer :: event, contact(max_events)
+      integer :: event
 
-      call self%detach_listed(self%listed(:schedule%broken), schedule)
-      if (schedule%broken > 0) call self%queue%remove_previewed(self%record, schedule%broken)
-      call self%attach_listed(schedule, contact)
-      do event = 1, schedule%attached
-         associate (one => contact(event))
-            self%life(life_birth, one) = schedule%attach_time(event)
-            self%life(life_limit, one) = self%next(next_configured, one)
-            self%life(life_motion, one) = self%motion
-            if (self%ageing%is_constant(self%life(life_limit, one), self%stretch)) then
-               self%life(life_motion, one) = any_motion
-            end if
-            self%next(next_speed, one) = 0.0_wp
-            call self%put(one)
-            self%behind = max(self%behind, self%behind_at(one, schedule%attach_time(event)))
-         end associate
-      end do
-      ! After all are queued, because that discards a solved next limit.
-      do event = 1, schedule%attached
+      do event = 1, size(contact)
          if (self%life(life_motion, contact(event)) < any_motion) then
             call solve_later(self, contact(event))
          end if
       end do
-   end subroutine settle_steady
+   end subroutine solve_attached
 
 end module mesoslip_contacts_ageing_steady

@@ -16,7 +16,7 @@ module mesoslip_sliders_rigid_short_step
    private
 
    public :: short_step_type, step_books_type
-   public :: try_short_step, books_of, derive, look_ahead, find_end, end_by_clocks, move, audit, &
+   public :: try_short_step, books_of, derive, look_ahead, find_end, move, audit, &
       & keep_series
 
    !> Maximum duration of a short step in units of the fastest rate
@@ -53,6 +53,8 @@ module mesoslip_sliders_rigid_short_step
       !> Distance to the next break [m], duration if there is none [s], and one over the velocity
       !> [s/m]
       real(wp) :: distance, rest, inverse_pace
+      !> Distance within which the slider may turn round [m]
+      real(wp) :: room
       real(wp) :: duration
       !> Whether it ends at a break, and where that is [m]; the time at which it ends otherwise [s]
       logical :: crosses
@@ -162,6 +164,9 @@ contains
       step%distance = sign(1.0_wp, motion%velocity) * (step%target - motion%displacement)
       step%end_time = window%end_time
       step%rest = window%end_time - motion%time
+      step%room = 0.0_wp
+      if (window%may_turn) step%room = min(window%upper - motion%displacement, &
+         & motion%displacement - window%lower)
       step%inverse_pace = 0.0_wp
       if (abs(motion%velocity) > 0.0_wp) step%inverse_pace = 1.0_wp / motion%velocity
    end subroutine look_ahead
@@ -228,7 +233,8 @@ contains
       do term = few_terms - 1, 1, -1
          change = (change + abs(series(term))) * step%rest
       end do
-      is_found = change < 0.5_wp * abs(step%early%velocity)
+      is_found = change < 0.5_wp * abs(step%early%velocity) &
+         & .or. (abs(step%early%velocity) + change) * step%rest < step%room
       step%crosses = .false.
       step%duration = step%rest
    end subroutine find_pause

@@ -107,7 +107,11 @@ class ThermalAgeingContacts(ThermalContacts):
     force_error_bound: ClassVar[float] = 1e-9
 
     def kernel_parameters(self, config: Setting) -> Parameters:
-        return super().kernel_parameters(config) | ageing_of(config).kernel_parameters()
+        return (
+            super().kernel_parameters(config)
+            | ageing_of(config).kernel_parameters()
+            | {"slider_jumps": int(config.slider.jumps)}
+        )
 
     def _problems(self, config: Setting) -> Complaints:
         yield from super()._problems(config)

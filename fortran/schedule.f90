@@ -264,8 +264,8 @@ contains
             & side => self%candidate_side(candidate))
             if (entry == 0) cycle
             excess = side * (displacement - self%candidate_start(candidate))
-            if (self%is_gone(entry) .or. excess < 0.0_wp &
-               & .or. side * (displacement - self%entry_origin(entry)) < 0.0_wp) cycle
+            if (self%is_gone(entry) .or. excess < 0.0_wp) cycle
+            if (displacement < self%entry_origin(entry) .neqv. side < 0.0_wp) cycle
             growth = self%ageing%threshold(self%entry_configured(entry), self%entry_mean(entry), &
                & time - self%entry_birth(entry)) - self%entry_bound(entry)
             self%candidate_refused(candidate) = excess < growth

@@ -72,12 +72,20 @@ contains
       displacement = self%displacement - origin
       direction = sign(1.0_wp, self%displacement)
       if (direction * schedule%direction > 0.0_wp) then
+         schedule%unlisted = min(schedule%unlisted, direction * displacement)
+         if (schedule%has_candidates .and. direction > 0.0_wp) then
+            schedule%upper = min(schedule%upper, displacement)
+         else if (schedule%has_candidates) then
+            schedule%lower = max(schedule%lower, displacement)
+         end if
+         ! Those end there, and contacts beyond may break before.
+         if (schedule%has_growth .or. schedule%has_candidates .and. .not. schedule%has_entries) &
+            & return
          do while (schedule%breaks > 0)
             if (schedule%break_coordinate(schedule%breaks) < direction * displacement) exit
             schedule%breaks = schedule%breaks - 1
          end do
          schedule%is_over = schedule%breaks == 0
-         schedule%unlisted = min(schedule%unlisted, direction * displacement)
       else
          schedule%behind = max(schedule%behind, schedule%direction * displacement)
       end if

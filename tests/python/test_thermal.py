@@ -555,3 +555,86 @@ def test_temperature_and_length_are_a_force():
     )
     thermal = config.contacts.thermal
     assert thermal.ratio(1e-9) == pytest.approx(1.380649e-23 * 300 / 0.3e-9 / 1e-9, rel=1e-14)
+
+
+def test_a_contact_without_a_force_breaks_at_the_rate_of_none():
+    """It has one sign of force, not both."""
+    count, ratio, duration = 2000, 0.2, 20.0
+    config = unit(
+        count,
+        run__duration=duration,
+        drive__velocity=0.0,
+        contacts__initial="relaxed",
+        contacts__threshold__relative_width=1e-3,
+        contacts__thermal={"rate": 1.0, "force_ratio": ratio},
+    )
+    expected = count * duration * math.exp(-1 / ratio)
+    assert abs(len(breaks(config)) - expected) < 5 * math.sqrt(expected)
+
+
+def test_contacts_whose_rates_are_tiny_at_the_start_relax_in_a_hold():
+    """Loaded far below their thresholds; at the start the largest rate is e^-980 ω_0."""
+    count, stretch, rate, ratio, hold = 20_000, 0.9, 1e6, 1e-3, 0.1
+    config = unit(
+        count,
+        run__duration=None,
+        drive={
+            "stage": [{"duration": stretch, "velocity": 1.0}, {"duration": hold, "velocity": 0}]
+        },
+        contacts__initial="relaxed",
+        contacts__threshold__relative_width=0.05,
+        contacts__thermal={"rate": rate, "force_ratio": ratio},
+        output__interval=stretch + hold,
+    )
+    thresholds = np.linspace(0.8, 1.2, 40_001)
+    weights = frozen_law("gaussian", 0.05).pdf(thresholds) * (thresholds[1] - thresholds[0])
+    gap = np.maximum(thresholds - stretch, 0.0)
+    # While loading the hazard is that of a time f_T/(k v) at the end.
+    broken = 1 - np.exp(-rate * np.exp(-gap / ratio) * (hold + ratio))
+    expected = count * float(weights @ np.where(thresholds > stretch, broken, 1.0))
+    assert expected > 600
+    assert abs(len(breaks(config)) - expected) < 5 * math.sqrt(expected)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        {
+            "contacts__ageing": {
+                "law": "relax",
+                "time": 0.1,
+                "young_force_ratio": 0.9,
+                "young_relative_width": 0.1,
+            }
+        },
+        {"contacts__ageing": {"law": "log", "time": 0.1, "growth": 0.05}},
+    ],
+    ids=["thresholds", "relax", "log"],
+)
+@pytest.mark.parametrize("velocity", [0.01, -0.01])
+def test_a_run_stops_at_its_displacement(changes, velocity):
+    config = unit(
+        200,
+        run__duration=1000.0,
+        run__realizations=40,
+        run__stop={"displacement": math.copysign(0.9973, velocity)},
+        drive__velocity=velocity,
+        **changes,
+    )
+    for number in range(40):
+        realization = at_end(Realization(config, number))
+        assert realization.time == pytest.approx(99.73, rel=1e-12)
+
+
+def test_a_run_ends_when_all_contacts_are_broken():
+    config = unit(
+        20,
+        run__duration=None,
+        run__avalanches=100,
+        contacts__reattach=False,
+        contacts__initial="relaxed",
+        slider={"kind": "quasistatic", "stiffness": 100.0},
+    )
+    realization = at_end(Realization(config, 0))
+    assert realization.breaks == 20

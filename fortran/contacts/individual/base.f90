@@ -87,7 +87,7 @@ module mesoslip_contacts_individual_base
       !> Detach a contact that breaks, and attach all contacts that are due
       procedure, non_overridable :: detach, attach_due
       !> Number of pinned contacts
-      procedure, non_overridable :: pinned_count
+      procedure, non_overridable :: pinned_count, are_broken
       !> Sort all contacts again from the records, and recompute the bound behind
       procedure, non_overridable :: rebuild_queue, max_behind
       !> Window between two coordinates
@@ -234,6 +234,15 @@ contains
 
       number = self%sites%count - self%detached%count
    end function pinned_count
+
+   !> Whether no contact is pinned, nor ever will be.
+   pure function are_broken(self)
+      class(individual_contacts_type), intent(in) :: self
+      logical :: are_broken
+
+      are_broken = self%pinned_count() == 0 &
+         & .and. min(self%detached%next_due, self%sites%next_time) >= huge(1.0_wp)
+   end function are_broken
 
    !> Attach all contacts that are due, in the order of their attachment times.
    subroutine attach_due(self, pose)

@@ -124,9 +124,8 @@ contains
          window%end_time = min(window%end_time, time_after(pose%time, max_span))
       end if
       ! Contacts may break at rest later on.
-      if (self%max_fall_time < max_time) then
-         window%end_time = min(window%end_time, time_after(pose%time, self%max_fall_time))
-      end if
+      if (self%max_fall_time < max_time) window%end_time = min(window%end_time, &
+         & time_after(pose%time, self%max_fall_time))
       window%max_phase = max(window%max_phase, phase_part * rate_part * self%resolution)
       window%upper = max(self%pinned%ahead, pose%displacement)
       window%lower = min(self%pinned%behind, pose%displacement)

@@ -116,6 +116,7 @@ contains
       window%may_turn = .true.
       window%upper = min(window%upper, self%candidates%upper)
       window%lower = max(window%lower, self%candidates%lower)
+      if (self%are_broken()) window%end_time = huge(1.0_wp)
    end subroutine offer
 
    subroutine respond(self, before, after)
@@ -225,7 +226,7 @@ contains
 
       if (self%is_late) call self%draw_candidates(pose)
       schedule%is_over = .true.
-      if (self%track%columns > 0 .or. .not. self%knows_lives()) return
+      if (self%track%columns > 0 .or. .not. self%knows_lives() .or. self%are_broken()) return
       call self%list_breaks(min(limit, self%max_length(by_coordinate)), pose, schedule)
       call self%list_candidates(limit, schedule)
       call self%list_attachments(min(limit, self%max_length(attachments)), pose%direction, &
@@ -324,7 +325,9 @@ contains
                else if (candidate%purpose == by_upward_force) then
                   schedule%candidate_upper(event) = max(candidate%bound, record(row_origin))
                else
-                  schedule%candidate_lower(event) = min(candidate%bound, record(row_origin))
+                  ! A contact without a force has none of that sign.
+                  schedule%candidate_lower(event) = min(candidate%bound, &
+                     & nearest(record(row_origin), -1.0_wp))
                end if
             end associate
          end associate

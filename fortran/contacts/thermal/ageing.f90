@@ -100,7 +100,12 @@ contains
 
       call initialize_ageing(self, state)
       do contact = 1, self%parameters%count
-         if (self%record(row_stiffness, contact) > 0.0_wp) call self%begin_life(contact)
+         if (.not. self%record(row_stiffness, contact) > 0.0_wp) cycle
+         call self%begin_life(contact)
+         if (self%ageing%falls(self%life(life_limit, contact), self%mean_of(contact))) cycle
+         ! An old contact may bear more than a newborn one could.
+         call self%candidates%insert(contact, self%record(row_origin, contact), &
+            & self%threshold(contact, 0.0_wp))
       end do
    end subroutine initialize
 
@@ -117,6 +122,7 @@ contains
       window%may_turn = .true.
       window%upper = min(window%upper, self%candidates%upper)
       window%lower = max(window%lower, self%candidates%lower)
+      if (self%are_broken()) window%end_time = huge(1.0_wp)
    end subroutine offer
 
    subroutine respond(self, before, after)

@@ -24,8 +24,8 @@ module mesoslip_contacts_thermal_candidates
    public :: candidates_type, candidate_type, new_candidates
    public :: by_upward_force, by_downward_force, by_newborn
 
-   !> What a candidate is for: the force of a contact that is positive or negative, or the force of
-   !> a contact that attaches after the draw
+   !> The force for which a candidate is drawn: that of a contact, which is positive (or 0) or
+   !> negative, or that of a contact that attaches after the draw
    integer, parameter :: by_upward_force = 1, by_downward_force = 2, by_newborn = 3
    !> Maximum number of candidates that are drawn together
    integer, parameter :: max_drawn = 32
@@ -279,7 +279,7 @@ contains
          now = now - log(first(event)) / whole
          self%candidate(event)%time = now
          call self%choose_contact(second(event) * whole, total, record, self%candidate(event))
-         ! The second candidate of a contact is usually in vain.
+         ! The second candidate of a contact is usually rejected.
          if (any(self%candidate(:event - 1)%contact == self%candidate(event)%contact)) exit
       end do
       self%drawn = min(event, length)
@@ -322,7 +322,8 @@ contains
          end do
       end if
       total(:2) = growth * total(:2)
-      total(3) = max(newborn_share * (total(1) + total(2)), newborn_expected * pace / width)
+      total(3) = max(newborn_share * (total(1) + total(2)), newborn_expected * pace / width, &
+         & self%contacts * self%rate * exp(-max_exponent))
       expected = (total(1) + total(2) + total(3)) * width / pace
       self%lower = displacement - width / self%slope
       self%upper = displacement + width / self%slope
@@ -348,7 +349,7 @@ contains
 
       real(wp) :: distance
 
-      distance = huge(1.0_wp)
+      distance = -min_exponent / self%slope
       if (self%tree(side)%total() > 0.0_wp) distance = -log(self%tree(side)%total()) / self%slope
       if (side == by_upward_force) then
          self%nearest(1) = self%reference + distance
@@ -443,11 +444,11 @@ contains
          case (by_upward_force)
             accepts = stretch >= 0.0_wp .and. displacement >= candidate%bound
          case (by_downward_force)
-            accepts = stretch <= 0.0_wp .and. displacement <= candidate%bound
+            accepts = stretch < 0.0_wp .and. displacement <= candidate%bound
          case default
             accepts = abs(stretch) >= record(row_limit) - candidate%bound &
                & .and. (record(row_renewal) >= candidate%life &
-               & .or. .not. self%has_weights(merge(1, 2, stretch > 0.0_wp)))
+               & .or. .not. self%has_weights(merge(1, 2, stretch >= 0.0_wp)))
             return
          end select
       end associate
@@ -474,11 +475,12 @@ contains
          if (candidate%purpose == by_newborn) then
             accepts = abs(stretch) >= threshold - candidate%bound &
                & .and. (record(row_renewal) >= candidate%life &
-               & .or. .not. self%has_weights(merge(1, 2, stretch > 0.0_wp)))
+               & .or. .not. self%has_weights(merge(1, 2, stretch >= 0.0_wp)))
             return
          end if
          side = candidate%side()
-         accepts = side * stretch >= 0.0_wp .and. side * (displacement - candidate%bound) &
+         accepts = merge(stretch >= 0.0_wp, stretch < 0.0_wp, side > 0.0_wp) &
+            & .and. side * (displacement - candidate%bound) &
             & >= threshold - self%limit(candidate%contact) &
             & .and. .not. abs(record(row_renewal) - candidate%life) > 0.0_wp
       end associate

@@ -8,16 +8,17 @@ module mesoslip_contacts_thermal_activated
    use mesoslip_contacts_individual_base, only: exchange_individual, individual_contacts_type, &
       & total_law
    use mesoslip_contacts_individual_births, only: drag_of
-   use mesoslip_contacts_individual_record, only: ahead_coordinate, row_limit, row_origin, &
-      & row_renewal, row_stiffness
+   use mesoslip_contacts_individual_record, only: row_limit, row_origin, row_renewal, &
+      & row_stiffness
    use mesoslip_contacts_individual_scan_order, only: new_scan_order, scan_order_type
    use mesoslip_contacts_mechanics, only: coupling_equal
    use mesoslip_contacts_thermal_candidates, only: by_newborn, by_upward_force, &
       & candidates_type, new_candidates
+   use mesoslip_contacts_thermal_uniform, only: new_uniform_motion, uniform_motion_type
    use mesoslip_interface_law, only: interface_law_type, pose_type, window_type
    use mesoslip_numerics_archive, only: archive_type
    use mesoslip_numerics_errors, only: error_type, raise, status_invalid, status_memory
-   use mesoslip_numerics_kinds, only: wp
+   use mesoslip_numerics_kinds, only: i8, wp
    use mesoslip_numerics_parameters, only: parameters_type
    use mesoslip_schedule, only: max_events, schedule_type
    implicit none
@@ -33,6 +34,8 @@ module mesoslip_contacts_thermal_activated
    !> Contacts that break by thermal activation.
    type, extends(individual_contacts_type) :: activated_contacts_type
       type(candidates_type) :: candidates
+      !> Where contacts break in a uniform motion, in which there are no candidates
+      type(uniform_motion_type) :: uniform
       !> Contacts by their breaks at the threshold in a motion up and down, and the order ahead
       type(scan_order_type) :: order(2)
       integer :: ahead = 1
@@ -47,8 +50,8 @@ module mesoslip_contacts_thermal_activated
    contains
       procedure :: initialize, offer, respond, plan, settle, join, leave, exchange, rebuild, &
          & shift_order
-      procedure, non_overridable, private :: insert, follow, break_contact, draw_candidates, &
-         & list_breaks, list_candidates, detach_came, attach_came
+      procedure, non_overridable, private :: insert, place, has_one_stretch, follow, follow_motion, break_contact, &
+         & draw_candidates, list_breaks, list_candidates, detach_came, attach_came
    end type activated_contacts_type
 
 contains
@@ -82,6 +85,8 @@ contains
       if (allocated(error)) return
       call new_candidates(self%candidates, common%count, rate, common%stiffness / force, &
          & common%seed, common%realization, error)
+      if (.not. allocated(error)) call new_uniform_motion(self%uniform, common%count, rate, &
+         & common%stiffness / force, common%seed, common%realization, error)
       do number = 1, size(self%order)
          if (.not. allocated(error)) call new_scan_order(self%order(number), common%count, error)
       end do
@@ -108,7 +113,7 @@ contains
 
       real(wp) :: ahead
 
-      if (self%is_late) call self%draw_candidates(pose)
+      call self%follow_motion(pose)
       law = total_law(self)
       call self%order(self%ahead)%first(ahead)
       window = self%window_between(self%behind, ahead, &
@@ -165,6 +170,33 @@ contains
       end if
    end subroutine follow
 
+   !> Prepare for the present motion of the slider: uniform, or with candidates.
+   subroutine follow_motion(self, pose)
+      class(activated_contacts_type), intent(inout) :: self
+      type(pose_type), intent(in) :: pose
+
+      integer :: contact
+      logical :: is_new
+
+      is_new = .false.
+      ! With a track it is not known before where contacts attach, nor thus where they break.
+      if (.not. self%parameters%strength%is_used) call self%uniform%follow(pose, is_new)
+      if (is_new) then
+         call self%candidates%forget()
+         self%is_late = .not. self%uniform%is_used()
+         if (self%uniform%is_used()) self%direction = sign(1.0_wp, pose%velocity)
+         do contact = 1, self%parameters%count
+            associate (record => self%record(:, contact))
+               if (self%uniform%is_used() .and. record(row_stiffness) > 0.0_wp) &
+                  & call self%uniform%solve_pinned(contact, &
+                  & self%direction * (pose%displacement - record(row_origin)), record(row_limit))
+            end associate
+         end do
+         call self%rebuild_queue(pose%displacement)
+      end if
+      if (self%is_late) call self%draw_candidates(pose)
+   end subroutine follow_motion
+
    !> Draw candidates from now on.
    subroutine draw_candidates(self, pose)
       class(activated_contacts_type), intent(inout) :: self
@@ -189,6 +221,34 @@ contains
       integer, intent(in) :: contact
       type(pose_type), intent(in) :: pose
 
+      real(wp) :: stretch, breaking(1)
+
+      if (self%uniform%is_used()) then
+         stretch = self%direction * (pose%displacement - self%record(row_origin, contact))
+         ! To the last digit as in a schedule.
+         if (self%has_one_stretch() .and. .not. self%touches) stretch = &
+            & self%parameters%back_force_ratio * self%parameters%static_force &
+            & / self%parameters%stiffness
+         breaking = self%record(row_limit, contact)
+         call self%uniform%solve_newborn([contact], self%record, 0_i8, [stretch], breaking)
+         self%uniform%stretch(contact) = breaking(1)
+      end if
+      call self%place(contact)
+   end subroutine join
+
+   !> Whether all contacts attach with one stretch, which is known to the last digit.
+   pure function has_one_stretch(self)
+      class(activated_contacts_type), intent(in) :: self
+      logical :: has_one_stretch
+
+      has_one_stretch = .not. (allocated(self%births%force) .or. self%parameters%keeps_thresholds)
+   end function has_one_stretch
+
+   !> Place a contact that has attached in the order of breaking.
+   subroutine place(self, contact)
+      class(activated_contacts_type), intent(inout) :: self
+      integer, intent(in) :: contact
+
       associate (origin => self%record(row_origin, contact), &
          & limit => self%record(row_limit, contact))
          call self%candidates%insert(contact, origin, limit)
@@ -196,15 +256,22 @@ contains
          self%behind = max(self%behind, self%behind_of(contact))
          self%is_late = self%is_late .or. self%candidates%exceeds_bound(origin, limit)
       end associate
-   end subroutine join
+   end subroutine place
 
    !> Insert a contact into the orders of both directions.
    subroutine insert(self, contact)
       class(activated_contacts_type), intent(inout) :: self
       integer, intent(in) :: contact
 
-      call self%order(1)%put(contact, ahead_coordinate(self%record(:, contact), 1.0_wp))
-      call self%order(2)%put(contact, ahead_coordinate(self%record(:, contact), -1.0_wp))
+      real(wp) :: stretch
+
+      associate (origin => self%record(row_origin, contact), &
+         & limit => self%record(row_limit, contact))
+         stretch = limit
+         if (self%uniform%is_used()) stretch = self%uniform%stretch(contact)
+         call self%order(self%ahead)%put(contact, self%direction * origin + stretch)
+         call self%order(3 - self%ahead)%put(contact, limit - self%direction * origin)
+      end associate
    end subroutine insert
 
    subroutine leave(self, contact)
@@ -224,17 +291,23 @@ contains
 
       integer :: contact(max_events), number
 
-      if (self%is_late) call self%draw_candidates(pose)
+      call self%follow_motion(pose)
       schedule%is_over = .true.
       if (self%track%columns > 0 .or. .not. self%knows_lives() .or. self%are_broken()) return
       call self%list_breaks(min(limit, self%max_length(by_coordinate)), pose, schedule)
       call self%list_candidates(limit, schedule)
       call self%list_attachments(min(limit, self%max_length(attachments)), pose%direction, &
          & schedule, contact)
+      if (self%uniform%is_used()) call self%uniform%solve_newborn( &
+         & contact(:schedule%attachments), self%record, 0_i8, &
+         & self%direction * schedule%attach_stretch(:schedule%attachments), schedule%attach_limit)
       ! The first contact beyond the list may break by a candidate.
       number = schedule%breaks
       if (self%listed(number + 1) > 0) number = number + 1
       call self%list_births(self%listed(:number), 0, pose%direction, schedule)
+      if (schedule%has_births .and. self%uniform%is_used()) call self%uniform%solve_newborn( &
+         & self%listed(:number), self%record, 1_i8, &
+         & self%direction * schedule%birth_stretch(:number), schedule%birth_limit)
       if (schedule%has_births) call self%list_births(self%listed(max_events + 1: &
          & max_events + schedule%candidates), max_events, pose%direction, schedule)
       schedule%is_over = .false.
@@ -403,7 +476,19 @@ contains
 
       call self%attach_listed(schedule, contact)
       do event = 1, schedule%attached
-         call self%join(contact(event), pose)
+         associate (record => self%record(:, contact(event)))
+            if (self%uniform%is_used()) then
+               self%uniform%stretch(contact(event)) = record(row_limit)
+               record(row_limit) = self%uniform%limit(contact(event))
+            end if
+            if (self%uniform%is_used() .and. .not. self%has_one_stretch()) then
+               ! As for a contact that attaches outside a schedule, whose force is not known before.
+               pose%displacement = schedule%attach_displacement(event)
+               call self%join(contact(event), pose)
+            else
+               call self%place(contact(event))
+            end if
+         end associate
       end do
    end subroutine attach_came
 
@@ -437,6 +522,7 @@ contains
       call archive%section("activated contacts")
       call exchange_individual(self, archive)
       call archive%exchange("is_late", self%is_late)
+      call self%uniform%exchange(archive)
       call self%candidates%exchange(archive)
    end subroutine exchange
 

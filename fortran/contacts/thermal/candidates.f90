@@ -99,6 +99,8 @@ module mesoslip_contacts_thermal_candidates
    contains
       !> Insert a contact, remove one, insert all again
       procedure, non_overridable :: insert, remove, fill
+      !> Draw none from now on, and keep no weights
+      procedure, non_overridable :: forget
       !> Whether a contact that attaches needs a new draw
       procedure, non_overridable :: exceeds_bound
       !> Whether a new draw is due, and the draw
@@ -215,6 +217,20 @@ contains
       end do
       call self%tree(side)%update_all()
    end subroutine fill_side
+
+   !> Draw no candidates from now on, in any window, and keep no weights until the next draw.
+   pure subroutine forget(self)
+      class(candidates_type), intent(inout) :: self
+
+      self%has_weights = .false.
+      self%nearest = [-huge(1.0_wp), huge(1.0_wp)]
+      self%drawn = 0
+      self%next = 1
+      self%lower = -huge(1.0_wp)
+      self%upper = huge(1.0_wp)
+      self%newborn_upper = -huge(1.0_wp)
+      self%newborn_lower = huge(1.0_wp)
+   end subroutine forget
 
    !> Whether the rate of a contact that attaches may exceed the bound for newborn ones.
    pure function exceeds_bound(self, origin, limit)

@@ -60,6 +60,8 @@ module mesoslip_contacts_individual_base
       real(wp) :: breaks_at_load = 0.0_wp
       !> Whether the contact that joins touches: it attaches without a force
       logical :: touches = .false.
+      !> Stretch with which the last contact attached, to the last digit as in a schedule [m]
+      real(wp) :: newborn_stretch = 0.0_wp
       !> Whether sites that touch or separate are listed in schedules, and those sites
       logical :: lists_sites = .false.
       integer, private :: site_listed(max_events) = 0
@@ -305,6 +307,7 @@ contains
          stretch = factor * (pose%direction * self%parameters%back_force_ratio &
             & * self%limit_at_birth(limit))
       end if
+      self%newborn_stretch = stretch
       limit = factor * limit
       origin = pose%displacement - stretch
       call self%drag%add(-drag)

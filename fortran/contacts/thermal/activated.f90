@@ -50,7 +50,7 @@ module mesoslip_contacts_thermal_activated
    contains
       procedure :: initialize, offer, respond, plan, settle, join, leave, exchange, rebuild, &
          & shift_order
-      procedure, non_overridable, private :: insert, place, has_one_stretch, follow, follow_motion, break_contact, &
+      procedure, non_overridable, private :: insert, place, follow, follow_motion, break_contact, &
          & draw_candidates, list_breaks, list_candidates, detach_came, attach_came
    end type activated_contacts_type
 
@@ -221,28 +221,16 @@ contains
       integer, intent(in) :: contact
       type(pose_type), intent(in) :: pose
 
-      real(wp) :: stretch, breaking(1)
+      real(wp) :: breaking(1)
 
       if (self%uniform%is_used()) then
-         stretch = self%direction * (pose%displacement - self%record(row_origin, contact))
-         ! To the last digit as in a schedule.
-         if (self%has_one_stretch() .and. .not. self%touches) stretch = &
-            & self%parameters%back_force_ratio * self%parameters%static_force &
-            & / self%parameters%stiffness
          breaking = self%record(row_limit, contact)
-         call self%uniform%solve_newborn([contact], self%record, 0_i8, [stretch], breaking)
+         call self%uniform%solve_newborn([contact], self%record, 0_i8, &
+            & [self%direction * merge(0.0_wp, self%newborn_stretch, self%touches)], breaking)
          self%uniform%stretch(contact) = breaking(1)
       end if
       call self%place(contact)
    end subroutine join
-
-   !> Whether all contacts attach with one stretch, which is known to the last digit.
-   pure function has_one_stretch(self)
-      class(activated_contacts_type), intent(in) :: self
-      logical :: has_one_stretch
-
-      has_one_stretch = .not. (allocated(self%births%force) .or. self%parameters%keeps_thresholds)
-   end function has_one_stretch
 
    !> Place a contact that has attached in the order of breaking.
    subroutine place(self, contact)
@@ -471,7 +459,6 @@ contains
       class(activated_contacts_type), intent(inout) :: self
       type(schedule_type), intent(in) :: schedule
 
-      type(pose_type) :: pose
       integer :: event, contact(max_events)
 
       call self%attach_listed(schedule, contact)
@@ -481,14 +468,8 @@ contains
                self%uniform%stretch(contact(event)) = record(row_limit)
                record(row_limit) = self%uniform%limit(contact(event))
             end if
-            if (self%uniform%is_used() .and. .not. self%has_one_stretch()) then
-               ! As for a contact that attaches outside a schedule, whose force is not known before.
-               pose%displacement = schedule%attach_displacement(event)
-               call self%join(contact(event), pose)
-            else
-               call self%place(contact(event))
-            end if
          end associate
+         call self%place(contact(event))
       end do
    end subroutine attach_came
 

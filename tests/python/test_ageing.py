@@ -77,15 +77,7 @@ def test_young_like_old_is_without_ageing_to_the_bit(kind, law):
     assert one["breaks"].values.min() >= 48
     names = ("displacement", "velocity", "spring_force", "contact_force", "breaks")
     if kind == "prescribed, thermal":
-        # Contacts break without clocks in uniform motion; as it changes, those that may age draw
-        # what is left of their lives anew.
-        drive = one["drive_displacement"].values[0]
-        uniform = np.flatnonzero(np.abs(np.diff(drive, 2)) > 1e-6 * np.ptp(drive))[0]
-        assert uniform > 20
-        for name in names[:-1]:
-            scale = np.nanmax(np.abs(one[name].values))
-            mine, other_mine = (run[name].values[:, :uniform] for run in (one, other))
-            np.testing.assert_allclose(mine, other_mine, rtol=0, atol=1e-12 * scale)
+        # In a uniform motion those that may age break by candidates, the others in closed form.
         np.testing.assert_allclose(one["breaks"], other["breaks"], rtol=0.1)
         for run in (one, other):
             assert np.max(np.abs(run["energy_residual"].values)) < 1e-12

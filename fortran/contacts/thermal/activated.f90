@@ -140,7 +140,8 @@ contains
       integer :: contact
 
       breaks = self%breaks
-      if (self%direction * pose%displacement <= self%behind) then
+      if (self%direction * pose%displacement <= self%behind &
+         & .and. .not. self%uniform%is_used()) then
          ! The bound may be that of a contact that has broken since.
          self%behind = -self%order(3 - self%ahead)%lowest()
          if (self%direction * pose%displacement <= self%behind) then
@@ -184,11 +185,11 @@ contains
       if (is_new) then
          call self%candidates%forget()
          self%is_late = .not. self%uniform%is_used()
-         if (self%uniform%is_used()) self%direction = sign(1.0_wp, pose%velocity)
+         if (.not. self%is_late) self%direction = sign(1.0_wp, pose%velocity)
          do contact = 1, self%parameters%count
             associate (record => self%record(:, contact))
-               if (self%uniform%is_used() .and. record(row_stiffness) > 0.0_wp) &
-                  & call self%uniform%solve_pinned(contact, &
+               if (self%is_late .or. .not. record(row_stiffness) > 0.0_wp) cycle
+               call self%uniform%solve_pinned(contact, &
                   & self%direction * (pose%displacement - record(row_origin)), record(row_limit))
             end associate
          end do

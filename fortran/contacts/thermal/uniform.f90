@@ -66,7 +66,8 @@ contains
       self%slope = slope
       self%seed = seed
       self%realization = realization
-      allocate (self%stretch(contacts), self%limit(contacts), source=0.0_wp, stat=stat)
+      allocate (self%stretch(contacts), source=0.0_wp, stat=stat)
+      if (stat == 0) allocate (self%limit(contacts), source=0.0_wp, stat=stat)
       if (stat /= 0) call raise(error, status_memory, "not enough memory for breaking stretches")
    end subroutine new_uniform_motion
 
@@ -80,8 +81,8 @@ contains
       real(wp) :: velocity
 
       velocity = 0.0_wp
-      if (pose%is_uniform .and. self%slope * abs(pose%velocity) >= min_velocity_ratio * self%rate) &
-         & velocity = pose%velocity
+      if (pose%is_uniform) velocity = pose%velocity
+      if (self%slope * abs(velocity) < min_velocity_ratio * self%rate) velocity = 0.0_wp
       is_new = abs(velocity - self%velocity) > 0.0_wp
       if (.not. is_new) return
       self%velocity = velocity

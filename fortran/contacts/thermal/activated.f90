@@ -1,8 +1,9 @@
 !> N independent contacts, which break by thermal activation.
 !>
 !> A contact under the force f breaks at the rate omega_0 exp((abs(f) - f_s)/f_T), and at once where
-!> abs(f) = f_s (Bell's law). Breaks below the threshold are drawn by thinning; there is no time
-!> step. The direction ahead is kept until an event on the way back.
+!> abs(f) = f_s (Bell's law). Breaks below the threshold are drawn by thinning, or in closed form
+!> in a uniform motion; there is no time step. The direction ahead is kept until an event on the
+!> way back.
 module mesoslip_contacts_thermal_activated
    use mesoslip_contacts_base, only: contact_parameters_type, contacts_type
    use mesoslip_contacts_individual_base, only: exchange_individual, individual_contacts_type, &

@@ -196,44 +196,6 @@ def test_uniform_motion_breaks_contacts_as_candidates_do(ratio, changes):
     assert stats.ks_2samp(*times).pvalue > 1e-3
 
 
-def relaxing(force_ratio: float, width: float) -> dict[str, Any]:
-    return {
-        "law": "relax",
-        "time": 2.0,
-        "young_force_ratio": force_ratio,
-        "young_relative_width": width,
-    }
-
-
-@pytest.mark.parametrize(
-    ("ageing", "ratio", "delay"),
-    [
-        ({"law": "log", "time": 1.0, "growth": 0.01}, 0.3, 0.1),
-        (relaxing(1.3, 0.05), 0.05, 0.1),
-        (relaxing(0.9, 0.3), 1.0, 0.0),
-    ],
-    ids=["log", "weaker", "relax"],
-)
-def test_uniform_motion_breaks_ageing_contacts_where_clocks_do(ageing, ratio, delay):
-    """Where thresholds grow so little that no bound is renewed before a contact would break."""
-    uniform, clocked = (
-        breaks(
-            unit(
-                12,
-                run__duration=None,
-                drive={"stage": [{"duration": 20.0, "start_velocity": 0.3, "end_velocity": end}]},
-                contacts__thermal={"rate": 1.0, "force_ratio": ratio},
-                contacts__ageing=ageing,
-                contacts__delay=delay,
-                contacts__back_force_ratio=0.1,
-            )
-        )
-        for end in (0.3, 0.3 * (1.0 + 1e-13))
-    )
-    assert len(uniform) == len(clocked) > 60
-    assert_same_events(uniform, clocked)
-
-
 @pytest.mark.parametrize(
     "changes",
     [

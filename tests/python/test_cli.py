@@ -8,7 +8,6 @@ import os
 import re
 import signal
 import sys
-from types import SimpleNamespace
 
 import mesoslip
 import mesoslip.__main__ as program
@@ -18,7 +17,6 @@ import tomli_w
 import xarray as xr
 from conftest import ROOT, klein_tables, long, python, run_program
 from mesoslip.analysis.regime import outputs
-from mesoslip.command_line import run as run_command
 from mesoslip.command_line.main import COMMANDS, GROUPS, app
 from mesoslip.command_line.progress import say
 from mesoslip.errors import RunError
@@ -226,10 +224,8 @@ def test_an_interrupt_after_the_output_is_written_is_answered_at_once(
     classify = outputs.classify
 
     def classify_once(*arguments):
-        # The first one may be evaluated before others run.
-        if output.exists():
-            judged.append(arguments)
-            os.kill(os.getpid(), signal.SIGINT)
+        judged.append(arguments)
+        os.kill(os.getpid(), signal.SIGINT)
         return classify(*arguments)
 
     monkeypatch.setattr(outputs, "classify", classify_once)
@@ -305,39 +301,6 @@ def test_start_up_is_quick():
     )
 
 
-def test_regimes_are_evaluated_while_others_run(short, tmp_path, command, monkeypatch):
-    """And once more after the output is written where that fails."""
-    evaluate, calls = outputs.regime_of_realization, []
-
-    def counted(config, one):
-        calls.append((one.number, (tmp_path / "short.nc").exists()))
-        if calls[-1] == (0, False):
-            raise RunError("no regime")
-        return evaluate(config, one)
-
-    monkeypatch.setattr("mesoslip.analysis.regime.outputs.regime_of_realization", counted)
-    options = ("--set", "run.realizations=3", "--workers", "1")
-    err = command("run", short, *options, "-o", tmp_path / "short.nc")[2]
-    assert "3 realizations" in err
-    # Others may have run many at a time, and are evaluated afterwards.
-    assert [one for one in calls if one[0] == 0] == [(0, False), (0, True)]
-    assert {number for number, _ in calls} == {0, 1, 2}
-
-
-def test_a_run_needs_no_thread_for_imports(short, tmp_path, command, monkeypatch):
-    class Refused:
-        def __init__(self, **_):
-            pass
-
-        def start(self):
-            raise RuntimeError("can't start new thread")
-
-    monkeypatch.setattr(run_command, "threading", SimpleNamespace(Thread=Refused))
-    output = tmp_path / "short.nc"
-    command("run", short, "-o", output)
-    assert output.exists()
-
-
 def test_commands_import_what_they_need(short, tmp_path, command):
     """Large packages that each of several commands adds to those imported before."""
     output = tmp_path / "short.nc"
@@ -368,7 +331,6 @@ import json, sys
 from mesoslip.analysis.regime import outputs
 from mesoslip.command_line.main import main
 large = ["dask", "matplotlib", "mpl_toolkits.mplot3d", "netCDF4", "pandas", "pint", "xarray"]
-large += ["mesoslip.analysis.strokes"]
 large += [f"scipy.{{one}}" for one in ("integrate", "interpolate", "optimize", "special", "stats")]
 stdout, found = sys.stdout, []
 for arguments in {commands}:
@@ -390,7 +352,7 @@ json.dump(found, stdout)
         ["scipy.interpolate", "scipy.optimize", "scipy.special"],
         [],
         [],
-        ["matplotlib", "mesoslip.analysis.strokes"],
+        ["matplotlib"],
         [],
         [],
         ["pandas", "xarray"],

@@ -4,10 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-import threading
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager, suppress
-from importlib import import_module
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -31,10 +27,8 @@ from mesoslip.errors import FileError, MesoslipError, NoMemoryError
 from mesoslip.execution.stop import Stop, stopped_by_signals
 
 if TYPE_CHECKING:
-    from mesoslip.analysis.regime.result import RegimeResult
     from mesoslip.configuration.config import Config
     from mesoslip.simulation.checkpoint import Checkpoint
-    from mesoslip.simulation.realization import Realization
     from mesoslip.simulation.run_realizations import Results
 
 # Exit status after Ctrl-C.
@@ -45,8 +39,6 @@ LARGE = 5e8
 LONG = 60.0
 # Rows of the trace that are read at once.
 MAX_ROWS = 400_000
-# Modules that are needed after a run only, and take long to import.
-LATER = ("mesoslip.output.writing", "mesoslip.output.files", "mesoslip.analysis.regime.outputs")
 
 
 def run(
@@ -79,7 +71,7 @@ def run(
     stopped by Ctrl-C, SIGTERM or SIGHUP. The same command with --resume continues from it.
     """
     from mesoslip.configuration.contacts.base import LOAD_CHANGE_SECONDS
-    from mesoslip.output import targets
+    from mesoslip.output import files, targets, writing
     from mesoslip.simulation.checkpoint import Checkpoint, checkpoint_folder
     from mesoslip.simulation.memory import check_memory, output_bytes
     from mesoslip.simulation.run_realizations import run_realizations
@@ -94,7 +86,7 @@ def run(
     def report(text: str) -> None:
         say(f"{path}: {text}")
 
-    if not quiet and _is_of_another(path, checked):
+    if not quiet and files.is_of_another(path, checked):
         report(
             "the output of another configuration will be replaced at the end; -o gives another name"
         )
@@ -115,16 +107,14 @@ def run(
         Checkpoint(folder, checked, interval=interval, resume=resume, report=report) as checkpoint,
         stopped_by_signals() as stop,
     ):
-        regimes = _Regimes(checked)
         try:
-            with _imported_meanwhile(), progress_shown(quiet) as progress:
+            with progress_shown(quiet) as progress:
                 results = run_realizations(
                     checked,
                     executor=executor_of(workers, scheduler),
                     progress=progress,
                     stop=stop,
                     checkpoint=checkpoint,
-                    evaluate=None if quiet or not regimes.are_wanted else regimes.take,
                 )
         except NoMemoryError as error:
             if not checkpoint.is_written:
@@ -135,8 +125,6 @@ def run(
             ) from error
         if not results.complete:
             raise typer.Exit(_keep(results, path, stop, checkpoint))
-        from mesoslip.output import files, writing
-
         try:
             threads = workers or os.cpu_count() or 1
             with progress_shown(quiet, "writing") as progress:
@@ -150,42 +138,9 @@ def run(
                 ) from error
             raise
         if not quiet:
-            _report_results(results, regimes, path, stop)
+            _report_results(results, checked, path, stop)
         files.remove_partial(_partial(path))
         checkpoint.remove()
-
-
-def _is_of_another(path: Path, config: Config) -> bool:
-    """Whether the run will replace the output of another configuration."""
-    if not os.path.lexists(path):
-        return False
-    from mesoslip.output import files
-
-    return files.is_of_another(path, config)
-
-
-def _import(names: Iterable[str]) -> None:
-    # What fails is imported once more, and fails, where it is needed.
-    with suppress(Exception):
-        for one in names:
-            import_module(one)
-
-
-@contextmanager
-def _imported_meanwhile() -> Iterator[None]:
-    """Import what is needed after a run on a thread of its own, while kernels run."""
-    thread = threading.Thread(target=_import, args=(LATER,), daemon=True)
-    try:
-        thread.start()
-    # Without a thread they are imported when they are needed.
-    except (MemoryError, RuntimeError):
-        yield
-        return
-    try:
-        yield
-    finally:
-        # A run may fail at once, and the program should not end in the middle of an import.
-        thread.join()
 
 
 def _partial(path: Path) -> Path:
@@ -213,11 +168,10 @@ def _keep(results: Results, path: Path, stop: Stop, checkpoint: Checkpoint) -> i
     return stop.exit_status
 
 
-def _report_results(results: Results, regimes: _Regimes, path: Path, stop: Stop) -> None:
+def _report_results(results: Results, config: Config, path: Path, stop: Stop) -> None:
     from mesoslip.output import layout
     from mesoslip.simulation.realization import ENDINGS
 
-    config = results.config
     known = layout.attributes(results)
     counts = [counted(known["break_count"], "break")]
     if config.has_avalanches:
@@ -232,7 +186,7 @@ def _report_results(results: Results, regimes: _Regimes, path: Path, stop: Stop)
     if config.drive.is_force:
         say(f"{path}: {_mean_velocity(results, config)}")
     else:
-        say(f"{path}: {regimes.summary(results, path, stop)}")
+        say(f"{path}: {_regimes(results, config, path, stop)}")
     if known["break_count"] == 0:
         say(f"{path}: no contact broke: {_short_drive(config)}")
     if known["audit"] != "passed":
@@ -266,43 +220,23 @@ def _short_drive(config: Config) -> str:
     return f"the path of the drive is {path_length}, and F_s/K is {needed}"
 
 
-class _Regimes:
-    """The regimes of the realizations of a run, each evaluated on the thread that has run it."""
+def _regimes(results: Results, config: Config, path: Path, stop: Stop) -> str:
+    """The regimes of all realizations, which may take longer than short runs; after an interrupt,
+    or of strokes, the command that evaluates them."""
+    from mesoslip.analysis.regime import outputs, result
 
-    def __init__(self, config: Config) -> None:
-        self._config = config
-        self._found: dict[int, RegimeResult] = {}
-
-    @property
-    def are_wanted(self) -> bool:
-        """Whether a regime is that of the motion: not of strokes, nor under a force."""
-        return not self._config.drive.is_force and self._config.drive.cycle is None
-
-    def take(self, one: Realization) -> None:
-        """Evaluate a realization at its end."""
-        from mesoslip.analysis.regime import outputs
-
-        # What fails is evaluated once more, and fails, after the output is written.
-        with suppress(Exception):
-            self._found[one.number] = outputs.regime_of_realization(self._config, one)
-
-    def summary(self, results: Results, path: Path, stop: Stop) -> str:
-        """The regimes of all realizations, which may take longer than short runs; after an
-        interrupt, or of strokes, the command that evaluates them."""
-        from mesoslip.analysis.regime import outputs, result
-
-        if self._config.drive.cycle is not None:
-            return f"the drive goes back and forth; 'mesoslip strokes {path}' evaluates its strokes"
-        count = len(results.realizations)
-        with progress_shown(count == 1, "regimes") as progress:
-            for number, one in enumerate(results.realizations, 1):
-                if stop.is_set():
-                    return f"complete; 'mesoslip regime {path}' prints the regime"
-                if one.number not in self._found:
-                    self._found[one.number] = outputs.regime_of_realization(self._config, one)
-                if number % max(1, count // 100) == 0:
-                    progress(number / count)
-        return result.summary([self._found[one.number] for one in results.realizations])
+    if config.drive.cycle is not None:
+        return f"the drive goes back and forth; 'mesoslip strokes {path}' evaluates its strokes"
+    found: list[result.RegimeResult] = []
+    count = len(results.realizations)
+    with progress_shown(count == 1, "regimes") as progress:
+        for one in outputs.regimes_of_results(results):
+            if stop.is_set():
+                return f"complete; 'mesoslip regime {path}' prints the regime"
+            found.append(one)
+            if len(found) % max(1, count // 100) == 0:
+                progress(len(found) / count)
+    return result.summary(found)
 
 
 def _mean_velocity(results: Results, config: Config) -> str:

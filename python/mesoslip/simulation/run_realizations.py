@@ -48,16 +48,14 @@ def run_realizations(
     progress: Callable[[float], None] | None = None,
     stop: StopRequest | None = None,
     checkpoint: Checkpoint | None = None,
-    evaluate: Callable[[Realization], None] | None = None,
 ) -> Results:
     """Run all realizations of a configuration, or continue them from a checkpoint.
 
     ``progress`` is called with the completed fraction, 0 to 1. ``stop`` or Ctrl-C ends the run
     between two segments. On executors other than threads a checkpoint keeps complete realizations
-    only. ``evaluate`` is called with a realization at its end, on the thread that has run it; those
-    that were run many at a time or elsewhere are left out.
+    only.
     """
-    run = _Run(config, as_executor(executor), progress, checkpoint, evaluate)
+    run = _Run(config, as_executor(executor), progress, checkpoint)
     start = time.perf_counter()
     before = checkpoint.restore(run.realizations) if checkpoint is not None else 0.0
     run.check()
@@ -93,14 +91,12 @@ class _Run:
         executor: Executor,
         progress: Callable[[float], None] | None,
         checkpoint: Checkpoint | None,
-        evaluate: Callable[[Realization], None] | None,
     ) -> None:
         self.realizations = Realization.all_of(config)
         self._config = config
         self._executor = executor
         self._progress = progress
         self._checkpoint = checkpoint
-        self._evaluate = evaluate
         self._under_way: set[Realization] = set()
 
     def check(self) -> None:
@@ -154,8 +150,6 @@ class _Run:
                 self._checkpoint.visit(realization)
         if realization.finished:
             realization.close()
-            if self._evaluate is not None:
-                self._evaluate(realization)
 
     def _compute_elsewhere(self, waiting: Sequence[Realization], stop: Stop) -> None:
         tables = self._config.to_dict()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -15,6 +15,8 @@ from mesoslip.analysis.regime.events import MIN_CYCLES, NO_SLIPS, Slips
 from mesoslip.analysis.regime.result import NAMES, REGIME, SMOOTH, TRANSIENT, RegimeResult
 from mesoslip.analysis.regime.rules import classify
 from mesoslip.analysis.regime.scales import Scales, Stage, measured_stage, stage_of
+from mesoslip.analysis.strokes.segments import Piece, output_pieces
+from mesoslip.analysis.strokes.sliding import sliding_of
 from mesoslip.array_types import Array, Dataset, DataTree
 from mesoslip.output.access import group_of, is_measured
 from mesoslip.output.arrays import Tree
@@ -22,9 +24,7 @@ from mesoslip.output.inputs import OutputLike, opened_run
 from mesoslip.simulation.recorded_tables import SLIP_COLUMNS, TRACE_COLUMNS
 
 if TYPE_CHECKING:
-    from mesoslip.analysis.strokes.segments import Piece
-    from mesoslip.configuration.config import Config
-    from mesoslip.simulation.realization import Realization
+    from mesoslip.simulation.run_realizations import Results
 
 
 # Maximum number of evaluated samples; longer traces are thinned out.
@@ -68,7 +68,7 @@ def judge(tree: Tree, name: str = "the output") -> tuple[list[RegimeResult], str
     for number in range(root.sizes["realization"]):
         mine = owner == number
         own = slips.of(mine)
-        pieces = _pieces(tree, number)
+        pieces = output_pieces(tree, number)[0] if is_measured(tree) else None
         if pieces is None:
             results.append(classify(*_window(tree, number, apparatus), own))
         else:
@@ -82,16 +82,6 @@ def judge(tree: Tree, name: str = "the output") -> tuple[list[RegimeResult], str
 
     motion, is_creep = motion_under_force(Experiment(tree, name))
     return [RegimeResult(SMOOTH if is_creep else TRANSIENT)] * len(results), motion
-
-
-def _pieces(tree: Tree, number: int) -> Sequence[Piece] | None:
-    """The strokes of a measured trace; None if it has none."""
-    if not is_measured(tree):
-        return None
-    # Runs do without, which would take longer to import than their regimes.
-    from mesoslip.analysis.strokes.segments import output_pieces
-
-    return output_pieces(tree, number)[0]
 
 
 def _slips(tree: Tree) -> tuple[Array, Slips]:
@@ -139,8 +129,6 @@ def _in_strokes(
     The parts between reversals are put one after the other, in time too, with forces along the
     motion. Without slips they are smooth, however the friction depends on the position.
     """
-    from mesoslip.analysis.strokes.sliding import sliding_of
-
     root = tree.to_dataset()
     time, force = root["time"].values, root[apparatus.force_name][number].values
     sliding = sliding_of(force, pieces)
@@ -210,30 +198,32 @@ def regime(output: OutputLike) -> Dataset:
         return regimes(tree, name)
 
 
-def regime_of_realization(config: Config, one: Realization) -> RegimeResult:
-    """The regime of a realization of a run; only the evaluated samples are held in memory."""
+def regimes_of_results(results: Results) -> Iterator[RegimeResult]:
+    """The regimes of the realizations of a run; only the evaluated samples are held in memory."""
     index = {name: number for number, name in enumerate(TRACE_COLUMNS)}
     wanted = [index[name] for name in ("time", "elastic_force", "velocity")]
     slip_index = {name: number for number, name in enumerate(SLIP_COLUMNS)}
-    rows = one.rows("trace")
-    if len(rows) < 2 * MIN_CYCLES:
-        return RegimeResult()
-    scales = Scales.of_config(config, one.time)
-    stage = scales.stage
-    step = _step(len(rows))
-    blocks, start = [np.empty((0, len(wanted)))], 0
-    for block in rows.blocks(MAX_SAMPLES):
-        chosen = block[-start % step :: step][:, wanted]
-        inside = (chosen[:, 0] >= stage.middle) & (chosen[:, 0] <= stage.end)
-        blocks.append(chosen[inside])
-        start += len(block)
-    time, force, velocity = np.concatenate(blocks).T
-    slips = np.concatenate(
-        [np.empty((0, len(SLIP_COLUMNS))), *one.rows("slips").blocks(MAX_SAMPLES)]
-    )
-    columns = ("start_time", "end_time", "force_before", "force_after")
-    began, ended, before, after = (slips[:, slip_index[name]] for name in columns)
-    return classify(scales, time, force, velocity, Slips(began, ended, before, before - after))
+    for one in results.realizations:
+        rows = one.rows("trace")
+        if len(rows) < 2 * MIN_CYCLES:
+            yield RegimeResult()
+            continue
+        scales = Scales.of_config(results.config, one.time)
+        stage = scales.stage
+        step = _step(len(rows))
+        blocks, start = [np.empty((0, len(wanted)))], 0
+        for block in rows.blocks(MAX_SAMPLES):
+            chosen = block[-start % step :: step][:, wanted]
+            inside = (chosen[:, 0] >= stage.middle) & (chosen[:, 0] <= stage.end)
+            blocks.append(chosen[inside])
+            start += len(block)
+        time, force, velocity = np.concatenate(blocks).T
+        slips = np.concatenate(
+            [np.empty((0, len(SLIP_COLUMNS))), *one.rows("slips").blocks(MAX_SAMPLES)]
+        )
+        columns = ("start_time", "end_time", "force_before", "force_after")
+        began, ended, before, after = (slips[:, slip_index[name]] for name in columns)
+        yield classify(scales, time, force, velocity, Slips(began, ended, before, before - after))
 
 
 def _step(count: int) -> int:

@@ -25,7 +25,7 @@ contains
       type(error_type), allocatable :: error
       real(wp) :: key(count), old(count), listed(limit), first, uniform(2)
       integer :: step, contact, number, due, contacts(limit), position
-      logical :: agrees, is_done
+      logical :: agrees
 
       call new_scan_order(order, count, error)
       key = huge(1.0_wp)
@@ -44,12 +44,6 @@ contains
             end if
             key(contact) = old(contact)
             call order%put(contact, key(contact))
-         end if
-         if (step == steps / 2) then
-            call order%rescale(0.5_wp, 4.0_wp, size(pack(key, key < huge(1.0_wp))), is_done)
-            agrees = agrees .and. is_done
-            where (key < huge(1.0_wp)) key = (key - 0.5_wp) * 4.0_wp
-            old = key
          end if
          call order%first(first)
          call order%due(first, due)

@@ -7,14 +7,12 @@
 module mesoslip_contacts_individual_scan_order
    use mesoslip_contacts_individual_sorting, only: before, push, remove_first, sort
    use mesoslip_numerics_errors, only: error_type, raise, status_memory
-   use mesoslip_numerics_kinds, only: i8, wp
+   use mesoslip_numerics_kinds, only: wp
    implicit none
    private
 
    public :: scan_order_type, new_scan_order
 
-   !> Maximum of keys that are rescaled
-   real(wp), parameter :: max_key = 1.0e290_wp
    !> Key of a contact that is not in the order
    real(wp), parameter :: none = huge(1.0_wp)
    !> Contacts wanted of the first scan; doubled in each scan up to this part of all contacts, 1/4
@@ -26,8 +24,6 @@ module mesoslip_contacts_individual_scan_order
    integer, parameter :: late_part = 16
    !> Bins in which contacts are sorted: their maximum number, mean and maximum contacts in one
    integer, parameter :: max_bins = 4096, bin_load = 2, max_load = 64
-   !> Ratio of two keys up to which those between are sorted as uniform
-   real(wp), parameter :: max_ratio = 8.0_wp
    !> Keys that are sampled to estimate a horizon
    integer, parameter :: samples = 64
    !> Contacts wanted over those found from which that is done again
@@ -55,8 +51,6 @@ module mesoslip_contacts_individual_scan_order
    contains
       !> Insert or change a contact, remove one, remove all
       procedure, non_overridable :: put, remove, clear
-      !> Shift and rescale all keys
-      procedure, non_overridable :: rescale
       !> The lowest key: by one pass over all keys, or by their order
       procedure, non_overridable :: lowest, first
       !> The first contact if its key has been reached, and the first contacts in their order
@@ -155,39 +149,6 @@ contains
       self%key(contact) = none
    end subroutine remove
 
-   !> Shift and rescale all keys, which keeps their order.
-   pure subroutine rescale(self, origin, factor, count, is_done)
-      class(scan_order_type), intent(inout) :: self
-      !> The new origin, and the factor
-      real(wp), intent(in) :: origin, factor
-      !> Number of contacts
-      integer, intent(in) :: count
-      !> Whether it was done; not if contacts have no keys, or a key is too large
-      logical, intent(out) :: is_done
-
-      real(wp) :: highest
-      integer :: number, contact
-
-      highest = max_key / max(1.0_wp, factor)
-      number = 0
-      do contact = 1, size(self%key)
-         number = number + merge(1, 0, self%key(contact) < highest)
-      end do
-      is_done = number == count
-      if (.not. is_done) return
-      do contact = 1, size(self%key)
-         if (self%key(contact) < none) self%key(contact) = (self%key(contact) - origin) * factor
-      end do
-      if (.not. max(abs(self%horizon), self%reach) < highest) then
-         call self%rest()
-         return
-      end if
-      self%horizon = (self%horizon - origin) * factor
-      self%reach = self%reach * factor
-      self%near_key(self%next:self%last) = (self%near_key(self%next:self%last) - origin) * factor
-      self%late_key(:self%late_count) = (self%late_key(:self%late_count) - origin) * factor
-   end subroutine rescale
-
    !> The lowest key, by the order of the next contacts; huge without contacts.
    pure subroutine first(self, key)
       class(scan_order_type), intent(inout) :: self
@@ -278,7 +239,7 @@ contains
       self%last = last
       call sort_evenly(self%near_key(slack + 1:last), self%near_contact(slack + 1:last), start, &
          & horizon)
-      ! Keys that grow exponentially are estimated again: a factor would follow them too slowly.
+      ! A distance that is far too small is estimated again: a factor would follow too slowly.
       if (last - slack < self%wanted / max_lack) self%reach = 0.0_wp
       if (self%reach < none / max_factor &
          & .and. (last - slack < self%wanted / 2 .or. last - slack > 2 * self%wanted)) then
@@ -312,8 +273,7 @@ contains
       last = entry
    end subroutine collect
 
-   !> Sort contacts by key, then by number; the keys are nearly uniform between two values, or their
-   !> logarithms are.
+   !> Sort contacts by key, then by number; the keys are nearly uniform between two values.
    pure subroutine sort_evenly(key, contact, start, horizon)
       real(wp), intent(inout), contiguous :: key(:)
       integer, intent(inout), contiguous :: contact(:)
@@ -323,9 +283,7 @@ contains
       integer, allocatable :: bin(:), last_contact(:)
       real(wp), allocatable :: last_key(:)
       integer :: filled(0:max_bins), bins, position, place, stat
-      integer(i8) :: first
       real(wp) :: scale
-      logical :: is_wide
 
       bins = min(max_bins, size(key) / bin_load)
       if (bins < 2 .or. .not. horizon < none) then
@@ -339,22 +297,11 @@ contains
          call sort(key, contact, size(key))
          return
       end if
-      is_wide = start > 0.0_wp .and. horizon > max_ratio * start
       filled(:bins) = 0
-      if (is_wide) then
-         ! The bits of a positive number are nearly those of its logarithm.
-         first = transfer(start, 1_i8)
-         scale = bins / real(transfer(horizon, 1_i8) - first, wp)
-         do position = 1, size(key)
-            bin(position) = min(bins, 1 + int(real(transfer(key(position), 1_i8) - first, wp) &
-               & * scale))
-         end do
-      else
-         scale = bins / (horizon - start)
-         do position = 1, size(key)
-            bin(position) = min(bins, 1 + int((key(position) - start) * scale))
-         end do
-      end if
+      scale = bins / (horizon - start)
+      do position = 1, size(key)
+         bin(position) = min(bins, 1 + int((key(position) - start) * scale))
+      end do
       do position = 1, size(key)
          filled(bin(position)) = filled(bin(position)) + 1
       end do

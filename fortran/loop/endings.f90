@@ -79,8 +79,9 @@ contains
             schedule%lower = max(schedule%lower, displacement)
          end if
          ! Those end there, and contacts beyond may break before.
-         if (schedule%has_growth .or. schedule%has_candidates .and. .not. schedule%has_entries) &
-            & return
+         if (schedule%has_growth .or. schedule%has_candidates .and. .not. schedule%has_entries) then
+           return
+         end if
          do while (schedule%breaks > 0)
             if (schedule%break_coordinate(schedule%breaks) < direction * displacement) exit
             schedule%breaks = schedule%breaks - 1

@@ -80,7 +80,7 @@ contains
          end if
          ! Those end there, and contacts beyond may break before.
          if (schedule%has_growth .or. schedule%has_candidates .and. .not. schedule%has_entries) then
-           return
+            return
          end if
          do while (schedule%breaks > 0)
             if (schedule%break_coordinate(schedule%breaks) < direction * displacement) exit

@@ -99,7 +99,7 @@ module mesoslip_schedule
       integer :: candidates = 0, tried = 0
       !> For each its time [s], followed by that of the first one beyond the list; displacements
       !> from which on, and down to which, it is accepted [m]; and the entry of its contact among
-      !> the breaks, which go on with those of candidates, 0 if the contacts decide
+      !> the breaks, which continue with those of candidates, 0 if the contacts decide
       real(wp) :: candidate_time(max_events + 1) = huge(1.0_wp), &
          & candidate_upper(max_events) = 0.0_wp, candidate_lower(max_events) = 0.0_wp
       integer :: candidate_entry(max_events) = 0

@@ -92,7 +92,7 @@ contains
                time = candidates%candidate(event)%time
                contact = candidates%candidate(event)%contact
                if (candidates%accepts(candidates%candidate(event), displacement, &
-                  & record(:, contact))) exit search
+                  & record(:, contact), record(row_limit, contact))) exit search
             end do
          end do search
          chosen(contact) = chosen(contact) + 1

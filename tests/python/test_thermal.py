@@ -505,7 +505,7 @@ def test_interaction_is_refused():
     tables = unit_tables(16, contacts__area=1e-10)
     lattice = {"lattice": "square", "columns": 4, "rows": 4}
     Config.from_dict(tables | {"interaction": lattice | {"strength": 0.0}})
-    with pytest.raises(ConfigError, match="do not share a clock"):
+    with pytest.raises(ConfigError, match="which neither engine follows"):
         Config.from_dict(tables | {"interaction": lattice | {"strength": 0.3}})
 
 

@@ -12,13 +12,12 @@ module mesoslip_contacts_thermal_activated
    use mesoslip_contacts_individual_record, only: row_limit, row_origin, row_renewal, &
       & row_stiffness
    use mesoslip_contacts_individual_scan_order, only: new_scan_order, scan_order_type
-   use mesoslip_contacts_mechanics, only: coupling_equal
    use mesoslip_contacts_thermal_candidates, only: by_newborn, by_upward_force, &
-      & candidates_type, new_candidates
+      & candidates_type, new_candidates, take_activation
    use mesoslip_contacts_thermal_uniform, only: new_uniform_motion, uniform_motion_type
    use mesoslip_interface_law, only: interface_law_type, pose_type, window_type
    use mesoslip_numerics_archive, only: archive_type
-   use mesoslip_numerics_errors, only: error_type, raise, status_invalid, status_memory
+   use mesoslip_numerics_errors, only: error_type, raise, status_memory
    use mesoslip_numerics_kinds, only: i8, wp
    use mesoslip_numerics_parameters, only: parameters_type
    use mesoslip_schedule, only: max_events, schedule_type
@@ -66,28 +65,22 @@ contains
       type(error_type), allocatable, intent(inout) :: error
 
       type(activated_contacts_type), allocatable :: self
-      real(wp) :: rate, force
+      real(wp) :: rate, slope
       integer :: columns, rows, number, stat
 
       call parameters%take("columns", columns, error)
       call parameters%take("rows", rows, error)
-      call parameters%take("activation_rate", rate, error)
-      call parameters%take("activation_force", force, error)
+      call take_activation(parameters, common, rate, slope, error)
       call parameters%finish(error)
       if (allocated(error)) return
-      if (.not. (rate > 0.0_wp .and. force > 0.0_wp) .or. common%coupling /= coupling_equal) then
-         call raise(error, status_invalid, "rate and force of activation must be positive, " &
-            & // "and contacts of one stiffness")
-         return
-      end if
       allocate (self)
       self%parameters = common
       call self%allocate_records(columns, rows, error)
       if (allocated(error)) return
-      call new_candidates(self%candidates, common%count, rate, common%stiffness / force, &
+      call new_candidates(self%candidates, common%count, rate, slope, &
          & common%seed, common%realization, error)
       if (.not. allocated(error)) call new_uniform_motion(self%uniform, common%count, rate, &
-         & common%stiffness / force, common%seed, common%realization, error)
+         & slope, common%seed, common%realization, error)
       do number = 1, size(self%order)
          if (.not. allocated(error)) call new_scan_order(self%order(number), common%count, error)
       end do
@@ -159,7 +152,7 @@ contains
       do while (self%candidates%next_time() <= pose%time)
          associate (candidate => self%candidates%candidate(self%candidates%next))
             if (self%candidates%accepts(candidate, pose%displacement, &
-               & self%record(:, candidate%contact))) then
+               & self%record(:, candidate%contact), self%record(row_limit, candidate%contact))) then
                call self%break_contact(candidate%contact, pose)
             end if
          end associate

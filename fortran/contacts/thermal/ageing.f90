@@ -13,12 +13,11 @@ module mesoslip_contacts_thermal_ageing
       & settle_ageing, shift_ageing
    use mesoslip_contacts_base, only: contact_parameters_type, contacts_type
    use mesoslip_contacts_individual_record, only: row_origin, row_renewal, row_stiffness
-   use mesoslip_contacts_mechanics, only: coupling_equal
    use mesoslip_contacts_thermal_candidates, only: by_newborn, candidate_type, &
-      & candidates_type, new_candidates
+      & candidates_type, new_candidates, take_activation
    use mesoslip_interface_law, only: interface_law_type, pose_type, window_type
    use mesoslip_numerics_archive, only: archive_type
-   use mesoslip_numerics_errors, only: error_type, raise, status_invalid, status_memory
+   use mesoslip_numerics_errors, only: error_type, raise, status_memory
    use mesoslip_numerics_kinds, only: wp
    use mesoslip_numerics_parameters, only: parameters_type
    use mesoslip_schedule, only: max_events, schedule_type
@@ -63,26 +62,20 @@ contains
       type(error_type), allocatable, intent(inout) :: error
 
       type(thermal_ageing_contacts_type), allocatable :: self
-      real(wp) :: rate, force
+      real(wp) :: rate, slope
       integer :: columns, rows, stat
 
       call parameters%take("columns", columns, error)
       call parameters%take("rows", rows, error)
-      call parameters%take("activation_rate", rate, error)
-      call parameters%take("activation_force", force, error)
+      call take_activation(parameters, common, rate, slope, error)
       if (allocated(error)) return
-      if (.not. (rate > 0.0_wp .and. force > 0.0_wp) .or. common%coupling /= coupling_equal) then
-         call raise(error, status_invalid, "rate and force of activation must be positive, " &
-            & // "and contacts of one stiffness")
-         return
-      end if
       allocate (self)
       call set_up_ageing(self, common, columns, rows, parameters, error)
       call parameters%finish(error)
       if (allocated(error)) return
       ! Candidates are listed by the slider's motion, and sites of a load are not.
       self%lists_sites = .false.
-      call new_candidates(self%candidates, common%count, rate, common%stiffness / force, &
+      call new_candidates(self%candidates, common%count, rate, slope, &
          & common%seed, common%realization, error)
       if (allocated(error)) return
       allocate (self%candidates%limit(common%count), source=0.0_wp, stat=stat)
@@ -305,10 +298,10 @@ contains
       logical :: is_accepted
 
       associate (contact => candidate%contact)
-         is_accepted = self%candidates%accepts_grown(candidate, pose%displacement, &
+         is_accepted = self%candidates%accepts(candidate, pose%displacement, &
             & self%record(:, contact), self%candidates%limit(contact))
          if (.not. is_accepted) return
-         is_accepted = self%candidates%accepts_grown(candidate, pose%displacement, &
+         is_accepted = self%candidates%accepts(candidate, pose%displacement, &
             & self%record(:, contact), self%threshold(contact, pose%time))
          if (.not. is_accepted) call self%refuse(contact)
       end associate

@@ -12,16 +12,19 @@
 !> of its own, the same for each; where its rate may be larger, candidates are drawn again: a
 !> process of constant rate has no memory.
 module mesoslip_contacts_thermal_candidates
+   use mesoslip_contacts_base, only: contact_parameters_type
    use mesoslip_contacts_individual_record, only: row_limit, row_origin, row_renewal, row_stiffness
+   use mesoslip_contacts_mechanics, only: coupling_equal
    use mesoslip_contacts_thermal_weight_tree, only: new_weight_tree, weight_tree_type
    use mesoslip_numerics_archive, only: archive_type
-   use mesoslip_numerics_errors, only: error_type
+   use mesoslip_numerics_errors, only: error_type, raise, status_invalid
    use mesoslip_numerics_kinds, only: i8, wp
+   use mesoslip_numerics_parameters, only: parameters_type
    use mesoslip_numerics_random, only: uniform_pairs
    implicit none
    private
 
-   public :: candidates_type, candidate_type, new_candidates
+   public :: candidates_type, candidate_type, new_candidates, take_activation
    public :: by_upward_force, by_downward_force, by_newborn
 
    !> The force for which a candidate is drawn: that of a contact, which is positive (or 0) or
@@ -54,7 +57,7 @@ module mesoslip_contacts_thermal_candidates
    type :: candidate_type
       !> Time [s], huge if there is none
       real(wp) :: time = huge(1.0_wp)
-      !> Number of the contact, and what it is for
+      !> Number of the contact, and the force for which it is drawn
       integer :: contact = 0, purpose = by_upward_force
       !> Renewals of the contact: exactly, or at least for a newborn one
       real(wp) :: life = 0.0_wp
@@ -106,13 +109,35 @@ module mesoslip_contacts_thermal_candidates
       !> Whether a new draw is due, and the draw
       procedure, non_overridable :: is_over, draw
       !> Time of the next candidate, and whether a candidate is accepted
-      procedure, non_overridable :: next_time, accepts, accepts_grown
+      procedure, non_overridable :: next_time, accepts
       procedure, non_overridable :: shift_origin, exchange
       procedure, non_overridable, private :: weight_of, fill_side, choose_window, &
          & choose_contact, drop_weights, lacks_weights
    end type candidates_type
 
 contains
+
+   !> Take rate and force of activation from named numbers.
+   subroutine take_activation(parameters, common, rate, slope, error)
+      type(parameters_type), intent(inout) :: parameters
+      type(contact_parameters_type), intent(in) :: common
+      !> Rate at the threshold [1/s], and k/f_T [1/m]
+      real(wp), intent(out) :: rate, slope
+      type(error_type), allocatable, intent(inout) :: error
+
+      real(wp) :: force
+
+      slope = 0.0_wp
+      call parameters%take("activation_rate", rate, error)
+      call parameters%take("activation_force", force, error)
+      if (allocated(error)) return
+      if (.not. (rate > 0.0_wp .and. force > 0.0_wp) .or. common%coupling /= coupling_equal) then
+         call raise(error, status_invalid, "rate and force of activation must be positive, " &
+            & // "and contacts of one stiffness")
+         return
+      end if
+      slope = common%stiffness / force
+   end subroutine take_activation
 
    !> Set up without contacts.
    subroutine new_candidates(self, contacts, rate, slope, seed, realization, error)
@@ -261,7 +286,7 @@ contains
       !> Records of all contacts, shape (record_length, number of contacts)
       real(wp), intent(in), contiguous :: record(:, :)
 
-      real(wp) :: total(3), whole, expected, now, first(max_drawn), second(max_drawn)
+      real(wp) :: total(3), total_rate, expected, now, first(max_drawn), second(max_drawn)
       integer(i8) :: number(max_drawn), key(max_drawn)
       integer :: event, length, side
 
@@ -280,8 +305,8 @@ contains
       end do
       self%drawn = 0
       self%next = 1
-      whole = total(1) + total(2) + total(3)
-      if (.not. whole > 0.0_wp) return
+      total_rate = total(1) + total(2) + total(3)
+      if (.not. total_rate > 0.0_wp) return
 
       length = 1 + int(min(drawn_share * expected, real(max_drawn - 1, wp)))
       do event = 1, length
@@ -292,9 +317,9 @@ contains
          & first(:length), second(:length))
       now = time
       do event = 1, length
-         now = now - log(first(event)) / whole
+         now = now - log(first(event)) / total_rate
          self%candidate(event)%time = now
-         call self%choose_contact(second(event) * whole, total, record, self%candidate(event))
+         call self%choose_contact(second(event) * total_rate, total, record, self%candidate(event))
          ! The second candidate of a contact is usually rejected.
          if (any(self%candidate(:event - 1)%contact == self%candidate(event)%contact)) exit
       end do
@@ -444,35 +469,7 @@ contains
    end function next_time
 
    !> Whether a candidate is accepted.
-   pure function accepts(self, candidate, displacement, record)
-      class(candidates_type), intent(in) :: self
-      type(candidate_type), intent(in) :: candidate
-      !> Displacement of the slider [m]
-      real(wp), intent(in) :: displacement
-      !> Record of its contact
-      real(wp), intent(in) :: record(:)
-      logical :: accepts
-
-      accepts = .false.
-      if (.not. record(row_stiffness) > 0.0_wp) return
-      associate (stretch => displacement - record(row_origin))
-         select case (candidate%purpose)
-         case (by_upward_force)
-            accepts = stretch >= 0.0_wp .and. displacement >= candidate%bound
-         case (by_downward_force)
-            accepts = stretch < 0.0_wp .and. displacement <= candidate%bound
-         case default
-            accepts = abs(stretch) >= record(row_limit) - candidate%bound &
-               & .and. (record(row_renewal) >= candidate%life &
-               & .or. .not. self%has_weights(merge(1, 2, stretch >= 0.0_wp)))
-            return
-         end select
-      end associate
-      accepts = accepts .and. .not. abs(record(row_renewal) - candidate%life) > 0.0_wp
-   end function accepts
-
-   !> Whether a candidate is accepted whose threshold grows.
-   pure function accepts_grown(self, candidate, displacement, record, threshold) result(accepts)
+   pure function accepts(self, candidate, displacement, record, threshold)
       class(candidates_type), intent(in) :: self
       type(candidate_type), intent(in) :: candidate
       !> Displacement of the slider [m]
@@ -483,7 +480,7 @@ contains
       real(wp), intent(in) :: threshold
       logical :: accepts
 
-      real(wp) :: side
+      real(wp) :: side, growth
 
       accepts = .false.
       if (.not. record(row_stiffness) > 0.0_wp) return
@@ -495,12 +492,13 @@ contains
             return
          end if
          side = candidate%side()
+         growth = 0.0_wp
+         if (allocated(self%limit)) growth = threshold - self%limit(candidate%contact)
          accepts = merge(stretch >= 0.0_wp, stretch < 0.0_wp, side > 0.0_wp) &
-            & .and. side * (displacement - candidate%bound) &
-            & >= threshold - self%limit(candidate%contact) &
+            & .and. side * (displacement - candidate%bound) >= growth &
             & .and. .not. abs(record(row_renewal) - candidate%life) > 0.0_wp
       end associate
-   end function accepts_grown
+   end function accepts
 
    !> Direction of the force of a candidate.
    pure function side_of(self) result(side)

@@ -1,7 +1,7 @@
 !> Weights of contacts, their sum, and the choice of a contact in proportion to its weight.
 !>
 !> A tree with several branches at each node, which holds the sum of its branches. Sums depend on
-!> the weights alone, not on the order of their changes; they are made again when they are needed.
+!> the weights alone, not on the order of their changes; they are recomputed when they are needed.
 module mesoslip_contacts_thermal_weight_tree
    use mesoslip_numerics_errors, only: error_type, raise, status_memory
    use mesoslip_numerics_kinds, only: wp
@@ -23,15 +23,15 @@ module mesoslip_contacts_thermal_weight_tree
       integer :: levels = 0, before(0:max_levels + 1) = 0
       !> Weight of a contact, or of all below a node, shape (positions)
       real(wp), allocatable :: weight(:)
-      !> Whether the sum of a node is old, shape (positions); numbers of the nodes of the first
+      !> Whether the sum of a node is outdated, shape (positions); numbers of the nodes of the first
       !> level of which that is so, and how many
-      logical, allocatable :: is_old(:)
-      integer, allocatable :: old(:)
-      integer :: old_count = 0
+      logical, allocatable :: is_outdated(:)
+      integer, allocatable :: outdated(:)
+      integer :: outdated_count = 0
    contains
       !> Change the weight of a contact
       procedure, non_overridable :: set
-      !> Make the sums again, those that are old or all
+      !> Recompute the sums, those that are outdated or all
       procedure, non_overridable :: update, update_all
       !> Sum of all weights, and the contact at a part of it
       procedure, non_overridable :: total, find
@@ -63,8 +63,8 @@ contains
       end do
       self%before(self%levels + 1) = positions
       allocate (self%weight(positions), source=0.0_wp, stat=stat)
-      if (stat == 0) allocate (self%is_old(positions), source=.false., stat=stat)
-      if (stat == 0) allocate (self%old(self%before(1) / branches), source=0, stat=stat)
+      if (stat == 0) allocate (self%is_outdated(positions), source=.false., stat=stat)
+      if (stat == 0) allocate (self%outdated(self%before(1) / branches), source=0, stat=stat)
       if (stat /= 0) call raise(error, status_memory, "not enough memory for rates of contacts")
    end subroutine new_weight_tree
 
@@ -78,34 +78,34 @@ contains
 
       self%weight(contact) = weight
       node = (contact - 1) / branches + 1
-      if (self%is_old(self%before(1) + node)) return
-      self%is_old(self%before(1) + node) = .true.
-      self%old_count = self%old_count + 1
-      self%old(self%old_count) = node
+      if (self%is_outdated(self%before(1) + node)) return
+      self%is_outdated(self%before(1) + node) = .true.
+      self%outdated_count = self%outdated_count + 1
+      self%outdated(self%outdated_count) = node
    end subroutine set
 
-   !> Make the sums again that are old.
+   !> Recompute the sums that are outdated.
    pure subroutine update(self)
       class(weight_tree_type), intent(inout) :: self
 
       integer :: level, event, node, count
 
-      count = self%old_count
-      self%old_count = 0
+      count = self%outdated_count
+      self%outdated_count = 0
       do level = 1, self%levels
          do event = 1, count
-            node = self%old(event)
+            node = self%outdated(event)
             call self%sum_up(level, node)
-            self%is_old(self%before(level) + node) = .false.
+            self%is_outdated(self%before(level) + node) = .false.
             if (level == self%levels) exit
             node = (node - 1) / branches + 1
-            if (self%is_old(self%before(level + 1) + node)) cycle
-            self%is_old(self%before(level + 1) + node) = .true.
-            self%old_count = self%old_count + 1
-            self%old(self%old_count) = node
+            if (self%is_outdated(self%before(level + 1) + node)) cycle
+            self%is_outdated(self%before(level + 1) + node) = .true.
+            self%outdated_count = self%outdated_count + 1
+            self%outdated(self%outdated_count) = node
          end do
-         count = self%old_count
-         self%old_count = 0
+         count = self%outdated_count
+         self%outdated_count = 0
       end do
    end subroutine update
 
@@ -120,8 +120,8 @@ contains
             call self%sum_up(level, node)
          end do
       end do
-      self%is_old = .false.
-      self%old_count = 0
+      self%is_outdated = .false.
+      self%outdated_count = 0
    end subroutine update_all
 
    !> Make the sum of a node of a level.

@@ -126,8 +126,8 @@ class Kernel:
         self._call(_core.set_slider, kind, *named(parameters))
 
     def set(self, procedure: Any, **values: Any) -> None:
-        """Set the drive, what ends the run early, or what is recorded: ``_core.set_drive``,
-        ``set_stop`` and such, with their arguments by name."""
+        """Set the drive, the stops or the recorder, by ``_core.set_drive``, ``_core.set_stop`` or
+        another procedure, with its arguments by name."""
         self._call(procedure, **values)
 
     def start(self, initial: str) -> None:

@@ -43,15 +43,15 @@ def thermal_problems(config: Setting) -> Complaints:
     if contacts.coupling != "equal":
         yield Complaint(
             "contacts.coupling",
-            'must be "equal" with contacts.thermal: contacts of one stiffness share the clock by '
-            "which they break",
+            'must be "equal" with contacts.thermal: the rates of contacts of one stiffness change '
+            "by one factor as the slider moves",
             contacts.coupling,
         )
     if config.interaction is not None and config.interaction.strength > 0:
         yield Complaint(
             "interaction.strength",
             "must be 0 with contacts.thermal: the forces of neighbours change the rate at which a "
-            "contact breaks, so that contacts do not share a clock",
+            "contact breaks, which neither engine follows",
             config.interaction.strength,
         )
     life = _idle_life(contacts, thermal, config.expected_duration)
